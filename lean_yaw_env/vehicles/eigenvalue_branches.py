@@ -1,0 +1,158 @@
+"""Bicycle modes followed continuously in the speed and named: weave, capsize, caster (Figure 4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lean_yaw_env.vehicles.bicycle import LinearBicycle
+from lean_yaw_env.vehicles.linear_motion import ComplexArray, FloatArray, finite_vector
+
+BRANCH_NAMES = ("weave_upper", "weave_lower", "capsize", "caster")
+"""Order of the branches. The weave is two branches: a conjugate pair, positive frequency first, or
+at low speed two real roots, the greater first."""
+
+_ASSIGNMENTS = np.array(list(permutations(range(4))))
+_CLEAR = 0.3
+"""The best assignment must cost less than this part of the next best one to be believed."""
+_LONGEST_STEP = 0.05
+"""Of the speed followed in one go, relative to the speed itself."""
+_SHORTEST_STEP = 1e-7
+"""Relative step below which two modes are taken as meeting: which is which has no meaning then."""
+
+
+@dataclass(frozen=True, eq=False)
+class EigenvalueBranches:
+    """Eigenvalues against speed, one column for each mode, in the order of ``BRANCH_NAMES``."""
+
+    speeds: FloatArray
+    """Shape (n,), m / s."""
+    eigenvalues: ComplexArray
+    """Shape (n, 4), 1 / s."""
+    mode_shapes: ComplexArray
+    """Shape (n, 4, 2): (lean, steer), of unit length, lean real and not negative."""
+
+    @property
+    def weave(self) -> ComplexArray:
+        """Both weave eigenvalues, shape (n, 2), 1 / s."""
+        return self.eigenvalues[:, :2]
+
+    @property
+    def capsize(self) -> ComplexArray:
+        """Shape (n,), 1 / s; real unless it has joined another mode's pair."""
+        return self.eigenvalues[:, 2]
+
+    @property
+    def caster(self) -> ComplexArray:
+        """Shape (n,), 1 / s; real unless it has joined another mode's pair."""
+        return self.eigenvalues[:, 3]
+
+    @property
+    def is_weave_oscillatory(self) -> np.ndarray:
+        """Whether the weave is a complex pair, shape (n,), bool."""
+        return np.all(self.weave.imag != 0.0, axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Modes:
+    """Named modes at one speed."""
+
+    speed: float
+    eigenvalues: ComplexArray
+    shapes: ComplexArray
+
+
+def follow_eigenvalues(bicycle: LinearBicycle, speeds: ArrayLike) -> EigenvalueBranches:
+    """Follow the four eigenvalues of a bicycle in the speed, each under its mode's name.
+
+    The names are given where they are beyond doubt, at a speed with one oscillation and two real
+    roots: the oscillation is the weave, of the real roots the greater is the capsize mode and the
+    lesser the caster mode. From there each mode is followed up and down, in steps small enough
+    that the assignment of old to new eigenvalues and mode shapes is clearly the cheapest.
+
+    Parameters
+    ----------
+    bicycle : LinearBicycle
+    speeds : a number or shape (n,)
+        m / s, not negative, in any order. The result for a speed does not depend on the others.
+
+    Raises
+    ------
+    ValueError
+        If a speed is negative or not finite, or the bicycle has no speed at which its modes can be
+        named.
+    """
+    requested = finite_vector("speeds", speeds)
+    if np.any(requested < 0.0):
+        raise ValueError(f"speeds must be in [0, inf), got {requested.min()!r}")
+    start = _name_modes(bicycle)
+    ordered, place = np.unique(requested, return_inverse=True)
+    found: dict[float, _Modes] = {}
+    for side in (ordered[ordered >= start.speed], ordered[ordered < start.speed][::-1]):
+        modes = start
+        for speed in side:
+            modes = _follow_to(bicycle, modes, float(speed))
+            found[float(speed)] = modes
+    rows = [found[float(speed)] for speed in ordered[place.reshape(-1)]]
+    return EigenvalueBranches(
+        speeds=requested,
+        eigenvalues=np.array([row.eigenvalues for row in rows]),
+        mode_shapes=np.array([row.shapes for row in rows]),
+    )
+
+
+def _name_modes(bicycle: LinearBicycle) -> _Modes:
+    """Modes at a speed with one complex pair and two real roots, in the order of the names."""
+    weave_speed = bicycle.weave_speed()
+    scale = bicycle.characteristic.speed_scale
+    trials = [] if weave_speed is None else [weave_speed]
+    for speed in [*trials, *(scale * np.geomspace(10.0, 0.1, 41))]:
+        values, shapes = bicycle.modes(speed)
+        real = np.flatnonzero(values.imag == 0.0)
+        if real.size == 2:
+            pair = np.flatnonzero(values.imag != 0.0)
+            order = [
+                *pair[np.argsort(-values[pair].imag)],
+                *real[np.argsort(-values[real].real)],
+            ]
+            return _Modes(float(speed), values[order], shapes[order])
+    raise ValueError(
+        "the modes cannot be named: no speed was found with one oscillating mode and two real "
+        f"eigenvalues, up to {10.0 * scale:g} m/s"
+    )
+
+
+def _follow_to(bicycle: LinearBicycle, modes: _Modes, speed: float) -> _Modes:
+    """Follow the modes to another speed, halving the step until the assignment is clear."""
+    while modes.speed != speed:
+        longest = _LONGEST_STEP * max(modes.speed, bicycle.characteristic.speed_scale)
+        step = float(np.clip(speed - modes.speed, -longest, longest))
+        whole = abs(speed - modes.speed) <= longest
+        following, is_clear = _assign(bicycle, modes, speed if whole else modes.speed + step)
+        while not is_clear and abs(step) > _SHORTEST_STEP * longest:
+            step *= 0.5
+            following, is_clear = _assign(bicycle, modes, modes.speed + step)
+        modes = following
+    return modes
+
+
+def _assign(bicycle: LinearBicycle, modes: _Modes, speed: float) -> tuple[_Modes, bool]:
+    """Give the modes at a new speed the names of those they are nearest to.
+
+    All 24 assignments are priced, for the runner-up's cost tells how clear the best one is.
+    """
+    values, shapes = bicycle.modes(speed)
+    distance = np.abs(modes.eigenvalues[:, None] - values[None, :]) / np.max(np.abs(values))
+    likeness = np.abs(modes.shapes.conj() @ shapes.T)
+    cost = distance + 1.0 - np.minimum(likeness, 1.0)
+    totals = cost[np.arange(4), _ASSIGNMENTS].sum(axis=1)
+    best, second = np.argsort(totals)[:2]
+    order = _ASSIGNMENTS[best]
+    upper, lower = values[order[:2]]
+    same_kind = (upper.imag == 0.0) == (lower.imag == 0.0)
+    if same_kind and (lower.imag, lower.real) > (upper.imag, upper.real):
+        order = order[[1, 0, 2, 3]]
+    return _Modes(speed, values[order], shapes[order]), bool(totals[best] < _CLEAR * totals[second])
