@@ -1,0 +1,18 @@
+"""The paper's nine-coordinate model (section 3.1) with feet of finite mass.
+
+A second opinion on the compiled walker: the same machine written down independently, with Lagrange multipliers,
+derivatives by sympy and integration by scipy. Needs sympy.
+"""
+
+from lean_yaw_env.multibody.dynamics import ContactForces
+from lean_yaw_env.multibody.results import FALLS, ForceExtremes, MultibodyStep, Trajectory
+from lean_yaw_env.multibody.walker import MultibodyWalker
+
+__all__ = [
+    "FALLS",
+    "ContactForces",
+    "ForceExtremes",
+    "MultibodyStep",
+    "MultibodyWalker",
+    "Trajectory",
+]

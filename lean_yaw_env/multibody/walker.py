@@ -1,0 +1,483 @@
+"""Steps of the nine-coordinate walker: integrate to heel strike, then the impact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import copysign, inf, nan, sin, tan
+from typing import Literal
+
+import numpy as np
+from scipy.integrate import DOP853, solve_ivp
+from scipy.optimize import brentq
+
+from lean_yaw_env.multibody.dynamics import (
+    Body,
+    ContactForces,
+    Offset,
+    Stance,
+    SwingFoot,
+    accelerations,
+    energy,
+    evaluate,
+    exchange_roles,
+    forces_from_multipliers,
+    impact,
+    place,
+    rates_from_section,
+    require_finite,
+    swing_foot,
+)
+from lean_yaw_env.multibody.kinematics import (
+    N_COORDINATES,
+    STANCE_ANKLE,
+    STANCE_LEG,
+    SWING_LEG,
+    Vector,
+)
+from lean_yaw_env.multibody.results import ForceExtremes, MultibodyStep, Trajectory
+from lean_yaw_env.multibody.shift import Shift
+
+SwingMode = Literal["held", "passive"]
+
+_SAMPLES_PER_STEP = 8
+"""Samples within one step of the integrator at which heel strike, falls and forces are looked at."""
+_LONGEST_STEP = 20.0
+"""Time after which a step without heel strike is given up; a gait's step takes about 1 to 4."""
+_FALLEN_ANGLE = 1.2
+"""Pitch or lean, rad, beyond which no walker of this kind comes back."""
+_LEAN = 4
+"""Place of the lean in a role vector."""
+
+
+@dataclass(frozen=True)
+class _Phase:
+    """One stance phase under way: its constants and the right-hand side."""
+
+    body: Body
+    stance: Stance
+    shift: Shift
+    is_held: bool
+
+    def derivative(self, time: float, y: Vector) -> Vector:
+        coordinates, rates = y[:N_COORDINATES], y[N_COORDINATES:]
+        second, _, _ = accelerations(
+            self.body,
+            self.stance,
+            coordinates,
+            rates,
+            offset=self.shift.at(time),
+            is_held=self.is_held,
+        )
+        return np.concatenate([rates, second])
+
+    def forces(self, time: float, y: Vector) -> ContactForces:
+        _, multipliers, _ = accelerations(
+            self.body,
+            self.stance,
+            y[:N_COORDINATES],
+            y[N_COORDINATES:],
+            offset=self.shift.at(time),
+            is_held=self.is_held,
+        )
+        return forces_from_multipliers(self.body, multipliers)
+
+    def energies(self, time: float, y: Vector) -> tuple[float, float]:
+        return energy(
+            self.body, self.stance, y[:N_COORDINATES], y[N_COORDINATES:], self.shift.at(time)
+        )
+
+    def pitch(self, y: Vector) -> float:
+        here = evaluate(
+            self.body, self.stance, y[:N_COORDINATES], y[N_COORDINATES:], Offset()
+        )
+        return here.pitch
+
+    def swing_foot(self, y: Vector) -> SwingFoot:
+        return swing_foot(self.body, self.stance, y[:N_COORDINATES])
+
+    def is_foot_in_front(self, y: Vector) -> bool:
+        """Whether meeting the floor here is a heel strike and not a passive leg's scuff near mid-stance."""
+        foot = self.swing_foot(y)
+        if not foot.is_before_vertical_axis or y[SWING_LEG] <= y[STANCE_LEG]:
+            return False
+        return self.is_held or foot.pitch > 0.0 > self.pitch(y)
+
+    def fall(self, y: Vector, forces: ContactForces) -> str | None:
+        pitch = self.pitch(y)
+        if abs(y[_LEAN]) > _FALLEN_ANGLE:
+            return "sideways"
+        if abs(pitch) > _FALLEN_ANGLE:
+            return "backward" if pitch > 0.0 else "forward"
+        return "lift-off" if forces.normal <= 0.0 else None
+
+
+@dataclass(frozen=True)
+class _End:
+    """How a stance phase ended, and its samples."""
+
+    time: float
+    y: Vector
+    fall: str | None
+    times: tuple[float, ...]
+    samples: tuple[Vector, ...]
+    forces: tuple[ContactForces, ...]
+
+
+@dataclass(frozen=True)
+class MultibodyWalker(Body):
+    """The paper's walker with feet of finite mass, a second opinion on the massless-foot walker.
+
+    Parameters
+    ----------
+    hip_width, foot_radius, ankle_tilt, slope : float
+        As in the paper's Table 1.
+    foot_mass : float
+        Of each foot, a point at the leg's end, in units of the two hip masses together.
+    shift_time : float
+        Time in which the hip masses move to a new offset.
+    tolerance : float
+        Relative tolerance of the integration; the absolute one is a tenth of it.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range.
+
+    Notes
+    -----
+    Exact in the model, slow by design: about 20 ms a step.
+    """
+
+    foot_mass: float = 1e-3
+    shift_time: float = 0.35
+    tolerance: float = 1e-11
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0.0 < self.shift_time < inf:
+            raise ValueError(f"shift_time must be a finite number > 0, got {self.shift_time!r}")
+        if not 1e-13 <= self.tolerance <= 1e-3:
+            raise ValueError(f"tolerance must be in [1e-13, 1e-3], got {self.tolerance!r}")
+
+    def step(
+        self,
+        state: Sequence[float],
+        *,
+        stance: str = "left",
+        inter_leg_angle: float = 0.3,
+        mass_offset: float = 0.0,
+        previous_offset: float | None = None,
+        swing: SwingMode = "held",
+        swing_rate: float | None = None,
+        trajectory: bool = False,
+    ) -> MultibodyStep:
+        """Walk from just after one heel strike to just after the next.
+
+        Parameters
+        ----------
+        state : 5 or 6 floats
+            Heading, stance pitch, ankle angle, stance pitch rate, ankle rate just after heel strike; for a
+            passive swing leg the inter-leg rate may follow.
+        stance : "left" or "right"
+            The foot that stands.
+        inter_leg_angle : float
+            Held swing leg: the angle at which it is held from the start. Passive: the angle at which it starts,
+            negative as it is behind (`MultibodyStep.inter_leg_angle` of the step before).
+        mass_offset : float
+            Offset of the hip masses along the axle, positive to the right.
+        previous_offset : float, optional
+            Offset at the start, if different; the masses then move smoothly in ``shift_time``.
+        swing : "held" or "passive"
+            Whether a torque at the hip holds the inter-leg angle or none acts.
+        swing_rate : float, optional
+            Inter-leg rate at the start of a passive step, when ``state`` has five entries.
+        trajectory : bool
+            Keep the samples of the stance phase.
+
+        Returns
+        -------
+        MultibodyStep
+            Its state has as many entries as the swing mode needs: 5 when held, 6 when passive.
+
+        Raises
+        ------
+        ValueError
+            If an argument is out of range or missing.
+        """
+        phase, start = self._start(
+            state,
+            stance=stance,
+            inter_leg_angle=inter_leg_angle,
+            mass_offset=mass_offset,
+            previous_offset=previous_offset,
+            swing=swing,
+            swing_rate=swing_rate,
+        )
+        end = _integrate(phase, start, self.tolerance)
+        kept = _trajectory(phase, end) if trajectory else None
+        return _result(phase, start, end, kept)
+
+    def stance_accelerations(
+        self, state: Sequence[float], **options: float | str | None
+    ) -> tuple[float, ...]:
+        """Second derivatives of stance pitch and ankle, and of the inter-leg angle if passive.
+
+        Arguments and errors as for `step`; evaluated at the start of the step.
+        """
+        phase, y = self._start(state, **options)  # type: ignore[arg-type]
+        second, _, here = accelerations(
+            self,
+            phase.stance,
+            y[:N_COORDINATES],
+            y[N_COORDINATES:],
+            offset=phase.shift.at(0.0),
+            is_held=phase.is_held,
+        )
+        pitch = float(here.pitch_jacobian[:N_COORDINATES] @ second) + here.pitch_bias
+        independent = (pitch, float(second[STANCE_ANKLE]))
+        if phase.is_held:
+            return independent
+        return (*independent, float(second[SWING_LEG] - second[STANCE_LEG]))
+
+    def contact_forces(
+        self, state: Sequence[float], **options: float | str | None
+    ) -> ContactForces:
+        """Contact forces at the start of a step. Arguments and errors as for `step`."""
+        phase, y = self._start(state, **options)  # type: ignore[arg-type]
+        return phase.forces(0.0, y)
+
+    def _start(
+        self,
+        state: Sequence[float],
+        *,
+        stance: str = "left",
+        inter_leg_angle: float = 0.3,
+        mass_offset: float = 0.0,
+        previous_offset: float | None = None,
+        swing: SwingMode = "held",
+        swing_rate: float | None = None,
+    ) -> tuple[_Phase, Vector]:
+        if stance not in ("left", "right"):
+            raise ValueError(f"stance must be 'left' or 'right', got {stance!r}")
+        if swing not in ("held", "passive"):
+            raise ValueError(f"swing must be 'held' or 'passive', got {swing!r}")
+        is_held = swing == "held"
+        numbers = tuple(float(value) for value in state)
+        require_finite("state", numbers)
+        inter_leg_rate = _inter_leg_rate(numbers, is_held, swing_rate)
+        before = mass_offset if previous_offset is None else previous_offset
+        for name, value in (
+            ("inter_leg_angle", inter_leg_angle),
+            ("mass_offset", mass_offset),
+            ("previous_offset", before),
+        ):
+            require_finite(name, (value,))
+        if is_held and not 0.0 < inter_leg_angle < np.pi:
+            raise ValueError(
+                f"inter_leg_angle of a held leg must be in (0, pi), got {inter_leg_angle!r}"
+            )
+        heading, pitch, ankle, pitch_rate, ankle_rate = numbers[:5]
+        standing = Stance(1.0 if stance == "left" else -1.0, heading)
+        phase = _Phase(self, standing, Shift(before, mass_offset, self.shift_time), is_held)
+        coordinates = place(self, standing, pitch, ankle, inter_leg_angle)
+        rates = rates_from_section(
+            self, standing, coordinates, pitch_rate, ankle_rate, inter_leg_rate
+        )
+        return phase, np.concatenate([coordinates, rates])
+
+
+def _inter_leg_rate(
+    state: tuple[float, ...], is_held: bool, swing_rate: float | None
+) -> float:
+    if is_held:
+        if len(state) != 5:
+            raise ValueError(f"state of a held step must have 5 entries, got {len(state)}")
+        if swing_rate is not None:
+            raise ValueError(f"swing_rate is for a passive leg, got {swing_rate!r} for a held one")
+        return 0.0
+    if len(state) == 6 and swing_rate is None:
+        return state[5]
+    if len(state) == 5 and swing_rate is not None:
+        require_finite("swing_rate", (swing_rate,))
+        return swing_rate
+    raise ValueError(
+        "a passive step needs a state of 6 entries, or 5 entries and swing_rate; "
+        f"got {len(state)} entries and swing_rate={swing_rate!r}"
+    )
+
+
+def _integrate(phase: _Phase, start: Vector, tolerance: float) -> _End:
+    times, samples = [0.0], [start]
+    forces = [phase.forces(0.0, start)]
+
+    def end(time: float, y: Vector, fall: str | None) -> _End:
+        if time > times[-1]:
+            times.append(time)
+            samples.append(y)
+            forces.append(phase.forces(time, y))
+        return _End(time, y, fall, tuple(times), tuple(samples), tuple(forces))
+
+    if phase.is_held and phase.swing_foot(start).clearance <= 0.0:
+        return end(0.0, start, "trip")
+    solver = DOP853(
+        phase.derivative, 0.0, start, _LONGEST_STEP, rtol=tolerance, atol=0.1 * tolerance
+    )
+    while solver.status == "running":
+        origin = (solver.t, solver.y)
+        message = solver.step()
+        if solver.status == "failed":
+            raise RuntimeError(f"the integrator gave up at t = {solver.t:.6g}: {message}")
+        dense = solver.dense_output()
+        for time in np.linspace(origin[0], solver.t, _SAMPLES_PER_STEP + 1)[1:].tolist():
+            y = dense(time)
+            before = phase.swing_foot(samples[-1]).clearance
+            if before > 0.0 >= phase.swing_foot(y).clearance:
+                strike = _locate(phase, dense, (times[-1], time))
+                if phase.is_foot_in_front(dense(strike)):
+                    return end(*_polish(phase, dense, origin, strike, tolerance), None)
+            force = phase.forces(time, y)
+            times.append(time)
+            samples.append(y)
+            forces.append(force)
+            fall = phase.fall(y, force)
+            if fall is not None:
+                return end(time, y, fall)
+    return end(solver.t, solver.y, "no heel strike")
+
+
+def _locate(
+    phase: _Phase, dense: Callable[[float], Vector], bracket: tuple[float, float]
+) -> float:
+    def clearance(time: float) -> float:
+        return phase.swing_foot(dense(time)).clearance
+
+    if clearance(bracket[0]) <= 0.0:
+        return bracket[0]
+    return float(brentq(clearance, *bracket, xtol=1e-14, rtol=1e-14))  # type: ignore[arg-type]
+
+
+def _polish(
+    phase: _Phase,
+    dense: Callable[[float], Vector],
+    origin: tuple[float, Vector],
+    strike: float,
+    tolerance: float,
+) -> tuple[float, Vector]:
+    """Take the located strike from the interpolant's accuracy to the integrator's."""
+    solution = solve_ivp(
+        phase.derivative,
+        (origin[0], strike),
+        origin[1],
+        method="DOP853",
+        rtol=tolerance,
+        atol=0.1 * tolerance,
+    )
+    y = solution.y[:, -1]
+    # Only the slope of a correction of about the tolerance: a difference over 1e-4 is more than enough.
+    width = 1e-4
+    ahead, behind = (phase.swing_foot(dense(strike + h)).clearance for h in (width, -width))
+    correction = -phase.swing_foot(y).clearance * 2.0 * width / (ahead - behind)
+    return strike + correction, y + correction * phase.derivative(strike, y)
+
+
+def _extremes(forces: tuple[ContactForces, ...]) -> ForceExtremes:
+    return ForceExtremes(
+        least_normal=min(force.normal for force in forces),
+        greatest_friction_demand=max(force.friction_demand for force in forces),
+        greatest_yaw_torque=max(abs(force.yaw_torque) for force in forces),
+        greatest_hip_torque=max(abs(force.hip_torque) for force in forces),
+    )
+
+
+def _section(
+    body: Body, stance: Stance, y: Vector, *, is_held: bool
+) -> tuple[tuple[float, ...], float, float]:
+    """Section state, inter-leg angle and its rate at role coordinates and rates ``y``, shape (16,)."""
+    coordinates, rates = y[:N_COORDINATES], y[N_COORDINATES:]
+    here = evaluate(body, stance, coordinates, rates, Offset())
+    inter_leg_rate = float(rates[SWING_LEG] - rates[STANCE_LEG])
+    state = (
+        stance.heading,
+        here.pitch,
+        float(coordinates[STANCE_ANKLE]),
+        float(here.pitch_jacobian[:N_COORDINATES] @ rates),
+        float(rates[STANCE_ANKLE]),
+    )
+    angle = float(coordinates[SWING_LEG] - coordinates[STANCE_LEG])
+    return (state if is_held else (*state, inter_leg_rate)), angle, inter_leg_rate
+
+
+def _residual(phase: _Phase, y: Vector) -> float:
+    here = evaluate(phase.body, phase.stance, y[:N_COORDINATES], y[N_COORDINATES:], Offset())
+    drift = here.constraint_jacobian[:, :N_COORDINATES] @ y[N_COORDINATES:]
+    return float(max(np.abs(here.constraints).max(), np.abs(drift).max()))
+
+
+def _side(stance: Stance) -> str:
+    return "left" if stance.side > 0.0 else "right"
+
+
+def _result(
+    phase: _Phase, start: Vector, end: _End, trajectory: Trajectory | None
+) -> MultibodyStep:
+    body, offset = phase.body, phase.shift.at(end.time)
+    at_start = sum(phase.energies(0.0, start))
+    kinetic, potential = phase.energies(end.time, end.y)
+    stance, y, impulse, after = phase.stance, end.y, None, nan
+    displacement = (0.0, 0.0)
+    if end.fall is None:
+        foot = phase.swing_foot(end.y)
+        roll = body.foot_radius * foot.pitch
+        displacement = (
+            float(foot.centre[0] + roll * np.cos(foot.heading)),
+            float(foot.centre[2] - roll * np.sin(foot.heading)),
+        )
+        stance = Stance(-phase.stance.side, foot.heading, displacement)
+        coordinates = exchange_roles(end.y[:N_COORDINATES], foot.ankle)
+        rates, impulses = impact(
+            body, stance, coordinates, exchange_roles(end.y[N_COORDINATES:], 0.0), offset
+        )
+        y = np.concatenate([coordinates, rates])
+        impulse = forces_from_multipliers(body, impulses)
+        after = sum(energy(body, stance, coordinates, rates, Offset(offset.value)))
+    state, angle, rate = _section(body, stance, y, is_held=phase.is_held)
+    return MultibodyStep(
+        state=state,
+        stance=_side(stance),
+        duration=end.time,
+        displacement=displacement,
+        mass_offset=offset.value,
+        inter_leg_angle=angle,
+        inter_leg_rate=rate,
+        fall=end.fall,
+        forces=_extremes(end.forces),
+        impulse=impulse,
+        energies=(at_start, kinetic + potential, after),
+        constraint_residual=_residual(phase, end.y),
+        trajectory=trajectory,
+    )
+
+
+def _trajectory(phase: _Phase, end: _End) -> Trajectory:
+    is_left = phase.stance.side > 0.0
+    coordinates, rates = [], []
+    for y in end.samples:
+        role, role_rates = y[:N_COORDINATES], y[N_COORDINATES:]
+        ahead = sin(role[SWING_LEG] + phase.body.ankle_tilt)
+        swing_ankle = float(
+            np.arctan2(copysign(1.0, ahead) * tan(role[_LEAN]), abs(ahead))
+        )
+        ankles = (swing_ankle, role[STANCE_ANKLE])
+        order = (SWING_LEG, STANCE_LEG) if is_left else (STANCE_LEG, SWING_LEG)
+        coordinates.append([*role[:5], *role[list(order)], *(ankles if is_left else ankles[::-1])])
+        rates.append([*role_rates[:5], *role_rates[list(order)], role_rates[STANCE_ANKLE]])
+    return Trajectory(
+        time=np.array(end.times),
+        coordinates=np.array(coordinates),
+        rates=np.array(rates),
+        forces=end.forces,
+        energies=np.array(
+            [phase.energies(t, y) for t, y in zip(end.times, end.samples, strict=True)]
+        ),
+    )
