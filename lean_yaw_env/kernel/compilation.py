@@ -1,0 +1,70 @@
+"""How the kernels are compiled: formulas inlined into a few cached entry points.
+
+``inlined`` marks a formula: it is compiled into whoever calls it, which is what lets LLVM vectorise a loop over walkers. ``entry_point``
+marks one of the few functions that are called from Python: only these are compiled on their own and kept on disk.
+
+Both keep IEEE semantics (no fast-math), so that every kernel that inlines the same formulas gives the same bits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from numba import njit
+
+# A division by zero gives inf or nan as in C: Python's exception would be a branch, and a branch stops vectorisation.
+_OPTIONS: dict[str, Any] = {"error_model": "numpy"}
+
+inlined: Callable[[Callable[..., Any]], Any] = njit(forceinline=True, **_OPTIONS)
+
+
+def _sources_digest() -> str:
+    """A digest of every kernel source file: what an entry point's machine code depends on."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+_SOURCES = _sources_digest()
+
+
+def entry_point(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Compile a function that Python calls, releasing the GIL, and keep its machine code on disk.
+
+    Numba renews its cache when the entry point's own file changes, but not when a formula inlined from another file does. The digest
+    of all kernel sources takes the place of that file's time stamp, which also serves file systems without stable times.
+    Where no cache folder can be written, the function is compiled in every process and a warning says so once.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        dispatcher = njit(nogil=True, **_OPTIONS, **options)(function)
+        if not hasattr(dispatcher, "enable_caching"):  # NUMBA_DISABLE_JIT=1 leaves a plain function
+            return dispatcher
+        try:
+            dispatcher.enable_caching()
+        except RuntimeError:
+            _warn_uncached()
+        else:
+            dispatcher._cache._cache_file._source_stamp = _SOURCES
+        return dispatcher
+
+    return decorate
+
+
+_warned: set[str] = set()
+
+
+def _warn_uncached() -> None:
+    if not _warned:
+        _warned.add("uncached")
+        warnings.warn(
+            "no folder for compiled code can be written, so the walker is compiled anew in every process (some seconds); "
+            "set NUMBA_CACHE_DIR to a writable folder",
+            RuntimeWarning,
+            stacklevel=4,
+        )

@@ -1,0 +1,144 @@
+"""The stance phase: geometry, mass matrix, equations of motion, contact force and energy of the walker on one foot.
+
+Two degrees of freedom: ``pitch`` (theta) of the foot that rolls, and ``twist`` (b, minus the ankle angle) about the ankle axis.
+Vectors are taken apart in the foot's own axes e1 = (cos alpha, sin alpha, 0), a = (sin alpha, -cos alpha, 0), e3, where a is the ankle axis:
+with A = theta + alpha these point along (cos A, sin A, 0), (sin A, -cos A, 0) and (0, 0, 1) of the stance frame (heading, normal, right).
+The masses' middle lies at q e1 - cos(alpha) a + q' e3 from the pivot, q = sin(alpha) cos b + z sin b, q' = dq/db, z its place on the axle.
+The derivation is in docs/model.md.
+"""
+
+from __future__ import annotations
+
+from lean_yaw_env.kernel.compilation import inlined
+from lean_yaw_env.kernel.elementary import sine_cosine
+
+
+@inlined
+def mass_offset(stance, time):
+    """Offset of the masses along the axle with its two rates, on the smooth path 10 s^3 - 15 s^4 + 6 s^5."""
+    s = time * stance.shift_rate
+    s = s if s.real < 1.0 else 1.0 + 0.0 * s
+    rest = 1.0 - s
+    change = stance.offset_change
+    rate = stance.shift_rate
+    offset = stance.offset_before + change * (s * s * s * (10.0 + s * (6.0 * s - 15.0)))
+    offset_rate = change * rate * (30.0 * s * s * rest * rest)
+    offset_acceleration = change * rate * rate * (60.0 * s * rest * (rest - s))
+    return offset, offset_rate, offset_acceleration
+
+
+@inlined
+def middle_of_masses(stance, sin_twist, cos_twist, offset):
+    """The middle's distance q along e1 from the pivot and q' along e3 (which is also dq/db)."""
+    z = stance.half_axle + offset
+    q = stance.sin_tilt * cos_twist + z * sin_twist
+    dq = z * cos_twist - stance.sin_tilt * sin_twist
+    return z, q, dq
+
+
+@inlined
+def mass_matrix(stance, sin_a, cos_a, sin_twist, z, q, dq):
+    """Entries of the 2x2 mass matrix, after the two levers U and W of the middle about the contact."""
+    u = stance.radius * cos_a + (1.0 - stance.radius) * stance.cos_tilt
+    w = stance.radius * sin_a + q - stance.radius * stance.sin_tilt
+    m11 = u * u + w * w + stance.axle_inertia * sin_twist * sin_twist
+    m12 = -u * dq
+    m22 = stance.sin_tilt * stance.sin_tilt + z * z + stance.axle_inertia
+    return u, w, m11, m12, m22
+
+
+@inlined
+def kinetic_energy(m11, m12, m22, pitch_rate, twist_rate):
+    return (
+        0.5 * m11 * pitch_rate * pitch_rate
+        + m12 * pitch_rate * twist_rate
+        + 0.5 * m22 * twist_rate * twist_rate
+    )
+
+
+@inlined
+def velocity_products(
+    stance, sin_twist, cos_twist, q, dq, pitch_rate, twist_rate, offset_rate, offset_acceleration
+):
+    """The middle's acceleration along e1, a and e3 that is not due to the two angular accelerations."""
+    p1 = q - stance.radius * stance.sin_tilt
+    p2 = (1.0 - stance.radius) * stance.cos_tilt
+    pitch_squared = pitch_rate * pitch_rate
+    twist_squared = twist_rate * twist_rate
+    b1 = (
+        -p1 * pitch_squared
+        - q * twist_squared
+        + 2.0 * offset_rate * cos_twist * twist_rate
+        + offset_acceleration * sin_twist
+    )
+    ba = (
+        p2 * pitch_squared
+        - 2.0 * dq * pitch_rate * twist_rate
+        - 2.0 * offset_rate * sin_twist * pitch_rate
+    )
+    b3 = (
+        -dq * twist_squared
+        - 2.0 * offset_rate * sin_twist * twist_rate
+        + offset_acceleration * cos_twist
+    )
+    return b1, ba, b3
+
+
+@inlined
+def accelerations(stance, time, pitch, twist, pitch_rate, twist_rate):
+    """Angular accelerations of pitch and twist: D'Alembert's principle along both degrees of freedom."""
+    sin_a, cos_a = sine_cosine(pitch + stance.tilt)
+    sin_twist, cos_twist = sine_cosine(twist)
+    offset, offset_rate, offset_acceleration = mass_offset(stance, time)
+    z, q, dq = middle_of_masses(stance, sin_twist, cos_twist, offset)
+    u, w, m11, m12, m22 = mass_matrix(stance, sin_a, cos_a, sin_twist, z, q, dq)
+    b1, ba, b3 = velocity_products(
+        stance, sin_twist, cos_twist, q, dq, pitch_rate, twist_rate, offset_rate, offset_acceleration
+    )
+    along_e1 = stance.gravity_x * cos_a + stance.gravity_y * sin_a - b1
+    along_a = stance.gravity_x * sin_a - stance.gravity_y * cos_a - ba
+    along_e3 = stance.gravity_z - b3
+    turning = stance.axle_inertia * sin_twist * cos_twist * pitch_rate
+    f1 = -u * along_e1 - w * along_a - 2.0 * turning * twist_rate
+    f2 = (
+        dq * along_e1
+        - q * along_e3
+        + turning * pitch_rate
+        - stance.ankle_stiffness * twist
+        - stance.ankle_damping * twist_rate
+    )
+    inverse = 1.0 / (m11 * m22 - m12 * m12)
+    return (m22 * f1 - m12 * f2) * inverse, (m11 * f2 - m12 * f1) * inverse
+
+
+@inlined
+def contact_force(
+    stance, time, pitch, twist, pitch_rate, twist_rate, pitch_acceleration, twist_acceleration
+):
+    """Normal force and the squared ratio of tangential to normal force, from the masses' acceleration."""
+    sin_a, cos_a = sine_cosine(pitch + stance.tilt)
+    sin_twist, cos_twist = sine_cosine(twist)
+    offset, offset_rate, offset_acceleration = mass_offset(stance, time)
+    z, q, dq = middle_of_masses(stance, sin_twist, cos_twist, offset)
+    u, w, m11, m12, m22 = mass_matrix(stance, sin_a, cos_a, sin_twist, z, q, dq)
+    b1, ba, b3 = velocity_products(
+        stance, sin_twist, cos_twist, q, dq, pitch_rate, twist_rate, offset_rate, offset_acceleration
+    )
+    f1 = b1 - stance.gravity_x * cos_a - stance.gravity_y * sin_a
+    fa = ba - stance.gravity_x * sin_a + stance.gravity_y * cos_a
+    f1 = f1 - u * pitch_acceleration + dq * twist_acceleration
+    fa = fa - w * pitch_acceleration
+    f3 = b3 - stance.gravity_z - q * twist_acceleration
+    normal = sin_a * f1 - cos_a * fa
+    forward = cos_a * f1 + sin_a * fa
+    return normal, (forward * forward + f3 * f3) / (normal * normal)
+
+
+@inlined
+def middle_position(stance, pitch, sin_a, cos_a, q, dq):
+    """Where the masses' middle is in the stance frame, from the contact point at zero pitch."""
+    sin_pitch = sin_a * stance.cos_tilt - cos_a * stance.sin_tilt
+    cos_pitch = cos_a * stance.cos_tilt + sin_a * stance.sin_tilt
+    x = stance.radius * (sin_pitch - pitch) + q * cos_a - stance.cos_tilt * sin_a
+    y = stance.radius * (1.0 - cos_pitch) + q * sin_a + stance.cos_tilt * cos_a
+    return x, y, dq

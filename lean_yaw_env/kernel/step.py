@@ -1,0 +1,254 @@
+"""One walking step: from a section state just after heel strike to the next one. Everything in the package calls this.
+
+A section state is (heading, stance pitch, ankle angle, stance pitch rate, ankle rate) with the side of the foot that stands.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lean_yaw_env.kernel.compilation import entry_point, inlined
+from lean_yaw_env.kernel.elementary import sine_cosine, within_half_turn
+from lean_yaw_env.kernel.flight import (
+    advance,
+    first_step_length,
+    shift_end_of,
+    time_to_touch,
+)
+from lean_yaw_env.kernel.heel_strike import impact, landing_place, landing_pose
+from lean_yaw_env.kernel.records import (
+    BACKWARD,
+    FAILED,
+    FLYING,
+    LANDING,
+    LIFT_OFF,
+    SIDEWAYS,
+    SLIP,
+    STEPPED,
+    TRIP,
+    Flight,
+    Outcome,
+    Stance,
+)
+from lean_yaw_env.kernel.stance import (
+    accelerations,
+    contact_force,
+    kinetic_energy,
+    mass_matrix,
+    mass_offset,
+    middle_of_masses,
+    middle_position,
+)
+from lean_yaw_env.kernel.swing import foot_gap
+
+# The gap before the last correction, which squares it: above this, the landing was not found.
+LANDING_RESIDUAL = 1e-9
+
+
+@inlined
+def stance_of(body, command, heading, side):
+    """Constants of a step. On a slope that turns with the walker, downhill is where the stance foot heads."""
+    sin_tilt, cos_tilt = sine_cosine(body.ankle_tilt)
+    sin_slope, cos_slope = sine_cosine(body.slope)
+    sin_heading, cos_heading = sine_cosine(within_half_turn(heading))
+    turns = body.slope_turns.real != 0.0
+    sin_inter_leg, cos_inter_leg = sine_cosine(command.inter_leg_angle)
+    return Stance(
+        body.foot_radius,
+        body.ankle_tilt,
+        sin_tilt,
+        cos_tilt,
+        0.5 * side * body.hip_width,
+        0.25 * body.hip_width * body.hip_width,
+        sin_slope if turns else sin_slope * cos_heading,
+        -cos_slope,
+        0.0 * sin_slope if turns else sin_slope * sin_heading,
+        sin_inter_leg,
+        cos_inter_leg,
+        body.ankle_stiffness,
+        body.ankle_damping,
+        command.offset_before,
+        command.offset - command.offset_before,
+        1.0 / body.shift_time,
+    )
+
+
+@inlined
+def start(stance, body, pitch, twist, pitch_rate, twist_rate):
+    """The flight just after heel strike: it may be a fall already, or (as an option) an immediate heel strike."""
+    sin_a, cos_a = sine_cosine(pitch + stance.tilt)
+    sin_twist, cos_twist = sine_cosine(twist)
+    time = 0.0 * pitch
+    dw, dv = accelerations(stance, time, pitch, twist, pitch_rate, twist_rate)
+    normal, friction = contact_force(stance, time, pitch, twist, pitch_rate, twist_rate, dw, dv)
+    gap, gap_rate, gap_acceleration, upright = foot_gap(
+        stance, sin_a, cos_a, sin_twist, cos_twist, pitch_rate, twist_rate, dw, dv
+    )
+    z, q, dq = middle_of_masses(stance, sin_twist, cos_twist, stance.offset_before)
+    u, w, m11, m12, m22 = mass_matrix(stance, sin_a, cos_a, sin_twist, z, q, dq)
+
+    first = first_step_length(
+        time_to_touch(gap.real, gap_rate.real, gap_acceleration.real), shift_end_of(stance).real
+    )
+    buried = gap.real <= 0.0
+    strikes = buried & (body.strike_at_start.real != 0.0)
+    rolls_back = (pitch_rate.real >= 0.0) & (dw.real >= 0.0)
+    status = BACKWARD if rolls_back else FLYING
+    status = TRIP if buried else status
+    status = LANDING if strikes else status
+    status = SIDEWAYS if (cos_twist.real <= 0.0) | (upright.real <= 0.0) else status
+    status = SLIP if friction.real > body.friction_limit.real * body.friction_limit.real else status
+    status = LIFT_OFF if normal.real <= 0.0 else status
+    return Flight(
+        time, pitch, twist, pitch_rate, twist_rate, dw, dv, gap, gap_rate, gap_acceleration,
+        0.0 if strikes else first, normal.real, friction.real, time, 1.0, 0.0, status,
+        pitch, twist, kinetic_energy(m11, m12, m22, pitch_rate, twist_rate),
+    )  # fmt: skip
+
+
+@inlined
+def short_step(c, t, x, b, w, v, dw1, dv1, h):
+    """One classical Runge-Kutta step of fourth order, for the last stretch to the landing; also the damping's loss."""
+    half = 0.5 * h
+    w2 = w + half * dw1
+    v2 = v + half * dv1
+    dw2, dv2 = accelerations(c, t + half, x + half * w, b + half * v, w2, v2)
+    w3 = w + half * dw2
+    v3 = v + half * dv2
+    dw3, dv3 = accelerations(c, t + half, x + half * w2, b + half * v2, w3, v3)
+    w4 = w + h * dw3
+    v4 = v + h * dv3
+    dw4, dv4 = accelerations(c, t + h, x + h * w3, b + h * v3, w4, v4)
+    sixth = h / 6.0
+    return (
+        x + sixth * (w + 2.0 * (w2 + w3) + w4),
+        b + sixth * (v + 2.0 * (v2 + v3) + v4),
+        w + sixth * (dw1 + 2.0 * (dw2 + dw3) + dw4),
+        v + sixth * (dv1 + 2.0 * (dv2 + dv3) + dv4),
+        sixth * c.ankle_damping * (v * v + 2.0 * (v2 * v2 + v3 * v3) + v4 * v4),
+    )
+
+
+@inlined
+def touch_down(stance, flight):
+    """Follow a landing flight to where the gap is zero, to round-off: a short step, then two Newton corrections in time.
+
+    The corrections carry complex parts, so that the landing time has its derivatives.
+    """
+    h = flight.next_step
+    x, b, w, v, loss = short_step(
+        stance, flight.time, flight.pitch, flight.twist, flight.pitch_rate, flight.twist_rate,
+        flight.pitch_acceleration, flight.twist_acceleration, h,
+    )  # fmt: skip
+    time = flight.time + h
+    dw, dv = accelerations(stance, time, x, b, w, v)
+    per_step = 1.0 / h if h != 0.0 else 0.0
+    jerk_w = (dw - flight.pitch_acceleration) * per_step
+    jerk_v = (dv - flight.twist_acceleration) * per_step
+    gap = flight.gap
+    for _ in range(2):
+        sin_a, cos_a = sine_cosine(x + stance.tilt)
+        sin_twist, cos_twist = sine_cosine(b)
+        gap, gap_rate, _, _ = foot_gap(stance, sin_a, cos_a, sin_twist, cos_twist, w, v, dw, dv)
+        correction = -gap / gap_rate
+        time = time + correction
+        x = x + correction * (w + correction * (0.5 * dw + correction * jerk_w / 6.0))
+        b = b + correction * (v + correction * (0.5 * dv + correction * jerk_v / 6.0))
+        w = w + correction * (dw + 0.5 * correction * jerk_w)
+        v = v + correction * (dv + 0.5 * correction * jerk_v)
+        dw = dw + correction * jerk_w
+        dv = dv + correction * jerk_v
+        loss = loss + correction * stance.ankle_damping * v * v
+    return time, x, b, w, v, gap, flight.damping_loss + loss
+
+
+@inlined
+def finish(stance, body, command, heading, side, flight):
+    """The outcome of a flight that has ended: the heel strike of one that lands, the last state of one that fell."""
+    landing = flight.status == LANDING
+    # An immediate strike has no gap to close: the foot is in the floor already
+    immediate = landing & (flight.next_step == 0.0) & (flight.attempts == 0.0)
+    moved_time, moved_x, moved_b, moved_w, moved_v, gap, moved_loss = touch_down(stance, flight)
+    moves = landing & (not immediate)
+    time = moved_time if moves else flight.time
+    x = moved_x if moves else flight.pitch
+    b = moved_b if moves else flight.twist
+    w = moved_w if moves else flight.pitch_rate
+    v = moved_v if moves else flight.twist_rate
+    loss = moved_loss if moves else flight.damping_loss
+
+    sin_a, cos_a = sine_cosine(x + stance.tilt)
+    sin_twist, cos_twist = sine_cosine(b)
+    offset, offset_rate, _ = mass_offset(stance, time)
+    turn, sin_turn, cos_turn, new_x, new_sin_a, new_cos_a, new_b, new_sin_twist, new_cos_twist = (
+        landing_pose(stance, sin_a, cos_a, sin_twist, cos_twist)
+    )
+    ahead, aside = landing_place(
+        stance, x, sin_a, cos_a, sin_twist, cos_twist, new_x, new_sin_a, new_cos_a, sin_turn, cos_turn
+    )
+    new_w, new_v, before, after = impact(
+        stance, sin_a, cos_a, sin_twist, cos_twist, w, v, offset, offset_rate,
+        new_sin_a, new_cos_a, new_sin_twist, new_cos_twist,
+    )  # fmt: skip
+
+    found = immediate | (abs(gap.real) <= LANDING_RESIDUAL)
+    # A walker that collapses onto its swing foot closes the gap as well: a step goes forward, onto a foot in front
+    forward = (w.real < 0.0) & (ahead.real > 0.0) & (cos_turn.real > 0.0)
+    status = flight.status
+    if landing:
+        status = STEPPED if forward else SIDEWAYS
+        status = status if found else FAILED
+    stepped = status == STEPPED
+
+    start_sin_a, start_cos_a = sine_cosine(flight.start_pitch + stance.tilt)
+    start_sin_twist, start_cos_twist = sine_cosine(flight.start_twist)
+    _, q, dq = middle_of_masses(stance, start_sin_twist, start_cos_twist, stance.offset_before)
+    x0, y0, z0 = middle_position(stance, flight.start_pitch, start_sin_a, start_cos_a, q, dq)
+    _, q, dq = middle_of_masses(stance, sin_twist, cos_twist, offset)
+    x1, y1, z1 = middle_position(stance, x, sin_a, cos_a, q, dq)
+    gravity_work = (
+        stance.gravity_x * (x1 - x0) + stance.gravity_y * (y1 - y0) + stance.gravity_z * (z1 - z0)
+    )
+    ankle_loss = loss + 0.5 * stance.ankle_stiffness * (
+        b * b - flight.start_twist * flight.start_twist
+    )
+    shifts = stance.offset_change.real != 0.0
+    shift_work = before - flight.start_kinetic - gravity_work + ankle_loss
+    sin_heading, cos_heading = sine_cosine(within_half_turn(heading))
+    nothing = 0.0 * x
+    return Outcome(
+        heading + turn if stepped else heading + nothing,
+        new_x if stepped else x,
+        -new_b if stepped else -b,
+        new_w if stepped else w,
+        -new_v if stepped else -v,
+        status,
+        time,
+        ahead * cos_heading + aside * sin_heading if stepped else nothing,
+        aside * cos_heading - ahead * sin_heading if stepped else nothing,
+        turn if stepped else nothing,
+        offset,
+        flight.least_normal_force,
+        np.sqrt(flight.friction_squared),
+        gravity_work,
+        shift_work if shifts else nothing,
+        before - after if stepped else nothing,
+        ankle_loss,
+        flight.evaluations + (4.0 if moves else 0.0),
+    )
+
+
+@inlined
+def walking_step(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side):
+    """One walking step; numbers may be complex to carry a derivative, every decision looks at real parts."""
+    stance = stance_of(body, command, heading, side)
+    flight = start(stance, body, pitch, -ankle, pitch_rate, -ankle_rate)
+    while flight.status == FLYING:
+        flight = advance(stance, body, flight)
+    return finish(stance, body, command, heading, side, flight)
+
+
+@entry_point()
+def step(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side):
+    """One walking step on floats: ``Body``, ``Command``, section state, side -> ``Outcome``."""
+    return walking_step(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side)
