@@ -1,7 +1,7 @@
 """The paper's nine-coordinate model (section 3.1) with feet of finite mass.
 
-A second opinion on the compiled walker: the same machine written down independently, with Lagrange multipliers,
-derivatives by sympy and integration by scipy. Needs sympy.
+A second opinion on the compiled walker: the same machine written down independently, with
+Lagrange multipliers, derivatives by sympy and integration by scipy. Needs sympy.
 """
 
 from lean_yaw_env.multibody.dynamics import ContactForces

@@ -1,13 +1,13 @@
 """Equations of motion, contact forces and impact of the nine-coordinate walker.
 
-The stance is a differential algebraic equation of index 1: accelerations and Lagrange multipliers come together from
-one bordered linear system (Schwab and Wisse 2001, the paper's section 3.1)
+The stance is a differential algebraic equation of index 1: accelerations and Lagrange multipliers
+come together from one bordered linear system (Schwab and Wisse 2001, the paper's section 3.1)
 
     [ M   -D' ] [ q''    ]   [ T' m (g - bias)   ]
     [ D    0  ] [ lambda ] = [ - constraint bias ],      M = T' m T,
 
-with T the Jacobian of the point masses' positions and D that of the constraints. The impact has the same matrix:
-momentum takes the place of force and impulses that of the multipliers.
+with T the Jacobian of the point masses' positions and D that of the constraints. The impact has the
+same matrix: momentum takes the place of force and impulses that of the multipliers.
 """
 
 from __future__ import annotations
@@ -38,7 +38,10 @@ HIP_MASS = 0.5
 
 @dataclass(frozen=True)
 class Body:
-    """What the walker is made of; lengths in leg lengths, masses in the two hips' mass, angles in rad."""
+    """What the walker is made of: lengths in leg lengths, masses in hip masses, angles in rad.
+
+    The unit of mass is both hip masses together.
+    """
 
     hip_width: float
     foot_radius: float
@@ -71,7 +74,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Stance:
-    """What is constant during a step: standing side (+1 left, -1 right), heading and contact reference point."""
+    """Constants of a step: side (+1 left foot, -1 right), heading, contact reference point."""
 
     side: float
     heading: float
@@ -80,7 +83,7 @@ class Stance:
 
 @dataclass(frozen=True)
 class Offset:
-    """Place of the hip masses along the axle, positive to the right, and its two time derivatives."""
+    """Place of the hip masses along the axle, positive to the right, and two derivatives."""
 
     value: float = 0.0
     rate: float = 0.0
@@ -100,8 +103,8 @@ class ContactForces:
     yaw_torque : float
         About the floor's normal through the contact, positive to the left.
     roll_torque : float
-        About the rolling direction through the middle of the contact line; the floor can give it only by
-        pressing ``-roll_torque / normal`` to the right of the middle.
+        About the rolling direction through the middle of the contact line; the floor can give it
+        only by pressing ``-roll_torque / normal`` to the right of the middle.
     hip_torque : float
         On the swing leg, forward, that holds the inter-leg angle; 0 for a passive leg.
     """
@@ -122,7 +125,7 @@ class ContactForces:
 def evaluate(
     body: Body, stance: Stance, coordinates: Vector, rates: Vector, offset: Offset
 ) -> Kinematics:
-    """Kinematics of ``body`` in this stance at role ``coordinates`` and ``rates``, each of shape (8,)."""
+    """Kinematics in this stance at role ``coordinates`` and ``rates``, each of shape (8,)."""
     return kinematics(
         coordinates,
         rates,
@@ -150,7 +153,7 @@ def _bordered_solve(mass: Vector, constraint_rows: Vector, top: Vector, bottom: 
     matrix[:N_COORDINATES, :N_COORDINATES] = mass
     matrix[:N_COORDINATES, N_COORDINATES:] = -constraint_rows.T
     matrix[N_COORDINATES:, :N_COORDINATES] = constraint_rows
-    return np.linalg.solve(matrix, np.concatenate([top, bottom]))
+    return np.asarray(np.linalg.solve(matrix, np.concatenate([top, bottom])), dtype=np.float64)
 
 
 def accelerations(
@@ -162,7 +165,7 @@ def accelerations(
     offset: Offset,
     is_held: bool,
 ) -> tuple[Vector, Vector, Kinematics]:
-    """Solve for accelerations (8,) and multipliers (5,), or (6,) with the swing leg held; also the kinematics."""
+    """Accelerations (8,), multipliers (5,) or, with the swing leg held, (6,), and kinematics."""
     here = evaluate(body, stance, coordinates, rates, offset)
     jacobian = here.position_jacobian[:, :N_COORDINATES]
     weighted = jacobian.T * body.masses
@@ -182,8 +185,9 @@ def forces_from_multipliers(body: Body, multipliers: Vector) -> ContactForces:
 
     Notes
     -----
-    The lateral multiplier acts at the cylinder's centre, ``foot_radius`` above the floor, hence its part in the
-    roll torque about the contact; the forward one acts at the contact itself, as its constraint has the pitch in it.
+    The lateral multiplier acts at the cylinder's centre, ``foot_radius`` above the floor, hence its
+    part in the roll torque about the contact; the forward one acts at the contact itself, as its
+    constraint has the pitch in it.
     """
     no_yaw, no_lean, normal, lateral, forward = (float(m) for m in multipliers[:N_CONSTRAINTS])
     return ContactForces(
@@ -199,7 +203,7 @@ def forces_from_multipliers(body: Body, multipliers: Vector) -> ContactForces:
 def energy(
     body: Body, stance: Stance, coordinates: Vector, rates: Vector, offset: Offset
 ) -> tuple[float, float]:
-    """Kinetic and potential energy; the potential is zero at the contact reference point of the first step."""
+    """Kinetic and potential energy; the potential is zero at the origin of the floor."""
     here = evaluate(body, stance, coordinates, rates, offset)
     velocities = here.position_jacobian @ np.append(rates, offset.rate)
     kinetic = 0.5 * float(body.masses @ velocities**2)
@@ -210,7 +214,7 @@ def energy(
 def impact(
     body: Body, new_stance: Stance, coordinates: Vector, rates: Vector, offset: Offset
 ) -> tuple[Vector, Vector]:
-    """Plastic impact in which only the new contact takes impulse and the hip masses lock to the axle.
+    """Plastic impact: only the new contact takes impulse, and the hip masses lock to the axle.
 
     Parameters
     ----------
@@ -222,7 +226,8 @@ def impact(
     Returns
     -------
     rates, impulses : shapes (8,) and (5,)
-        Rates after the impact and the contact's impulsive multipliers in the order of `CONSTRAINTS`.
+        Rates after the impact and the contact's impulsive multipliers in the order of
+        `CONSTRAINTS`.
     """
     here = evaluate(body, new_stance, coordinates, rates, offset)
     jacobian = here.position_jacobian[:, :N_COORDINATES]
@@ -233,10 +238,8 @@ def impact(
     return solution[:N_COORDINATES], solution[N_COORDINATES:]
 
 
-def place(
-    body: Body, stance: Stance, pitch: float, ankle: float, inter_leg_angle: float
-) -> Vector:
-    """Role coordinates, shape (8,), of a walker whose stance foot meets all five contact constraints."""
+def place(body: Body, stance: Stance, pitch: float, ankle: float, inter_leg_angle: float) -> Vector:
+    """Role coordinates, shape (8,), that meet all five contact constraints."""
     ahead = np.array([cos(stance.heading), 0.0, -sin(stance.heading)])
     contact = np.array([stance.contact[0], 0.0, stance.contact[1]])
     up = np.array([0.0, 1.0, 0.0])
@@ -260,7 +263,7 @@ def rates_from_section(
     ankle_rate: float,
     inter_leg_rate: float,
 ) -> Vector:
-    """Role rates, shape (8,), that the contact allows and that have the three given independent rates."""
+    """Role rates, shape (8,), that the contact allows, from the three independent ones."""
     here = evaluate(body, stance, coordinates, np.zeros(N_COORDINATES), Offset())
     ankle_row = np.zeros(N_COORDINATES)
     ankle_row[STANCE_ANKLE] = 1.0
@@ -273,7 +276,7 @@ def rates_from_section(
         ]
     )
     wanted = np.array([0.0] * N_CONSTRAINTS + [pitch_rate, ankle_rate, inter_leg_rate])
-    return np.linalg.solve(matrix, wanted)
+    return np.asarray(np.linalg.solve(matrix, wanted), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -291,7 +294,8 @@ class SwingFoot:
     centre : shape (3,)
         Centre of the cylinder.
     is_before_vertical_axis : bool
-        Whether the ankle axis points forward and down. A foot further back has no well-defined flat orientation.
+        Whether the ankle axis points forward and down. A foot further back has no well-defined
+        flat orientation.
     """
 
     clearance: float
@@ -308,8 +312,8 @@ def swing_foot(body: Body, stance: Stance, coordinates: Vector) -> SwingFoot:
     axle_frame = rotation_y(yaw) @ rotation_x(lean)
     leg = axle_frame @ rotation_z(leg_pitch)
     hip = np.array([x, y, z]) + stance.side * body.hip_width / 2 * axle_frame[:, 2]
+    # The ankle undoes the axle's slope: tan(ankle) = tan(lean) / sin(leg pitch + tilt).
     ahead = sin(leg_pitch + body.ankle_tilt)
-    # The axle's slope, -sin(lean), is undone by the ankle: tan(ankle) = tan(lean) / sin(leg pitch + tilt).
     ankle = atan(tan(lean) / ahead) if ahead != 0.0 else pi / 2
     foot = leg @ rotation_ankle(-ankle, body.ankle_tilt)
     centre = hip - leg[:, 1] + body.foot_radius * foot[:, 1]

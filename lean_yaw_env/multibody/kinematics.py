@@ -1,12 +1,14 @@
 """Positions and contact constraints of the nine-coordinate walker, differentiated by sympy.
 
-The paper, section 3.1, writes twelve dependent coordinates (x, y, z of each of four point masses) in terms of the
-generalized coordinates and adds five contact constraints. Both are stated here once, as symbols; sympy
-supplies their first derivatives and the terms quadratic in the rates. Nothing else in the project shares
-this code, so that agreement with the compiled walker means something.
+The paper, section 3.1, writes twelve dependent coordinates (x, y, z of each of four point masses)
+in terms of the generalized coordinates and adds five contact constraints. Both are stated here
+once, as symbols; sympy supplies their first derivatives and the terms quadratic in the rates.
+Nothing else in the project shares this code, so that agreement with the compiled walker means
+something.
 
-A step is written in *roles*, stance and swing, rather than left and right: the side enters as the sign ``side``
-(+1 when the left foot stands). The coordinates of a role vector are named by `ROLE_COORDINATES`.
+A step is written in *roles*, stance and swing, rather than left and right: the side enters as the
+sign ``side`` (+1 when the left foot stands). The coordinates of a role vector are named by
+`ROLE_COORDINATES`.
 """
 
 from __future__ import annotations
@@ -34,8 +36,8 @@ ROLE_COORDINATES = (
 """Coordinates that carry inertia or constraints; the swing ankle, the ninth, carries neither."""
 
 N_COORDINATES = len(ROLE_COORDINATES)
-STANCE_LEG, SWING_LEG, STANCE_ANKLE = 5, 6, 7
-"""Places of the two leg pitches and the stance ankle in a role vector."""
+LEAN, STANCE_LEG, SWING_LEG, STANCE_ANKLE = 4, 5, 6, 7
+"""Places of lean, the two leg pitches and the stance ankle in a role vector."""
 
 N_POSITIONS = 12
 N_CONSTRAINTS = 5
@@ -45,7 +47,7 @@ CONSTRAINTS = ("no yaw", "no lean", "height", "no lateral slip", "no forward sli
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Values and derivatives at one configuration and rate; ``v = (role coordinates, mass offset)``.
+    """Values and derivatives in ``v = (role coordinates, mass offset)``.
 
     Attributes
     ----------
@@ -135,7 +137,7 @@ def _compiled() -> Callable[..., Any]:
     stance_end = stance_hip - stance_leg * e2
     swing_end = swing_hip - swing_leg * e2
 
-    # Leg = foot * R_a(ankle), the ankle axis being the y axis turned over and tilted by alpha about z.
+    # leg = foot * R_a(ankle); the ankle axis is the y axis turned over and tilted about z.
     foot = stance_leg * about_z(tilt) * about_y(ankle) * about_z(-tilt)
     cylinder = stance_end + foot_radius * foot * e2
     ahead = sp.Matrix([sp.cos(heading), 0, -sp.sin(heading)])

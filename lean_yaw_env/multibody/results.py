@@ -30,9 +30,9 @@ class Trajectory:
     time : shape (n,)
         Since the start of the step.
     coordinates : shape (n, 9)
-        x_h, y_h, z_h, u1 to u6 in the paper's order: centre of the axle, yaw, lean, right and left leg pitch, right
-        and left ankle. The swing ankle is the one that keeps its foot flat; while the swing ankle's axis is
-        vertical that angle is ill-defined.
+        x_h, y_h, z_h, u1 to u6 in the paper's order: centre of the axle, yaw, lean, right and
+        left leg pitch, right and left ankle. The swing ankle is the one that keeps its foot flat;
+        while the swing ankle's axis is vertical that angle is ill-defined.
     rates : shape (n, 8)
         Of all coordinates but the swing ankle, which has no inertia, in the same order.
     forces : tuple of ContactForces
@@ -55,7 +55,8 @@ class MultibodyStep:
     Attributes
     ----------
     state : tuple of 5 or 6 floats
-        Section state after the impact (see `MultibodyWalker.step`); after a fall, the state in which it was noticed.
+        Section state after the impact (see `MultibodyWalker.step`); after a fall, the state in
+        which it was noticed.
     stance : "left" or "right"
         The foot that stands now.
     duration : float
@@ -63,9 +64,11 @@ class MultibodyStep:
     displacement : tuple of 2 floats
         From the old contact reference point to the new one, x and z; zero after a fall.
     mass_offset : float
-        Offset in force at the end of the step; differs from the commanded one if heel strike came in mid-shift.
+        Offset in force at the end of the step; differs from the commanded one if heel strike came
+        in mid-shift.
     inter_leg_angle, inter_leg_rate : float
-        Swing minus stance leg pitch just after the impact (the new swing leg is behind) and its rate.
+        Swing minus stance leg pitch just after the impact (the new swing leg is behind) and its
+        rate.
     fall : str or None
         One of `FALLS`.
     forces : ForceExtremes
@@ -73,9 +76,11 @@ class MultibodyStep:
     impulse : ContactForces or None
         Impulses on the new stance foot; None after a fall.
     energies : tuple of 3 floats
-        Kinetic plus potential: at the start, at the end before the impact and just after it (nan after a fall).
+        Kinetic plus potential: at the start, at the end before the impact and just after it (nan
+        after a fall).
     constraint_residual : float
-        Largest violation of a contact constraint, or of its rate, that has built up by the end of the phase.
+        Largest violation of a contact constraint, or of its rate, that has built up by the end of
+        the phase.
     trajectory : Trajectory or None
         On request.
     """

@@ -9,7 +9,9 @@ from lean_yaw_env.multibody.dynamics import Offset
 
 @dataclass(frozen=True)
 class Shift:
-    """From ``start`` to ``target`` in ``duration``, with zero velocity and acceleration at both ends.
+    """From ``start`` to ``target`` in ``duration``, smoothly.
+
+    Velocity and acceleration are zero at both ends.
 
     The blend is the polynomial 10 s^3 - 15 s^4 + 6 s^5 of s = t / duration.
     """

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import copysign, inf, nan, sin, tan
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
-from scipy.integrate import DOP853, solve_ivp
-from scipy.optimize import brentq
 
 from lean_yaw_env.multibody.dynamics import (
     Body,
     ContactForces,
     Offset,
     Stance,
-    SwingFoot,
     accelerations,
     energy,
     evaluate,
@@ -26,102 +23,20 @@ from lean_yaw_env.multibody.dynamics import (
     place,
     rates_from_section,
     require_finite,
-    swing_foot,
 )
 from lean_yaw_env.multibody.kinematics import (
+    LEAN,
     N_COORDINATES,
     STANCE_ANKLE,
     STANCE_LEG,
     SWING_LEG,
     Vector,
 )
+from lean_yaw_env.multibody.phase import Phase, PhaseEnd, integrate
 from lean_yaw_env.multibody.results import ForceExtremes, MultibodyStep, Trajectory
 from lean_yaw_env.multibody.shift import Shift
 
 SwingMode = Literal["held", "passive"]
-
-_SAMPLES_PER_STEP = 8
-"""Samples within one step of the integrator at which heel strike, falls and forces are looked at."""
-_LONGEST_STEP = 20.0
-"""Time after which a step without heel strike is given up; a gait's step takes about 1 to 4."""
-_FALLEN_ANGLE = 1.2
-"""Pitch or lean, rad, beyond which no walker of this kind comes back."""
-_LEAN = 4
-"""Place of the lean in a role vector."""
-
-
-@dataclass(frozen=True)
-class _Phase:
-    """One stance phase under way: its constants and the right-hand side."""
-
-    body: Body
-    stance: Stance
-    shift: Shift
-    is_held: bool
-
-    def derivative(self, time: float, y: Vector) -> Vector:
-        coordinates, rates = y[:N_COORDINATES], y[N_COORDINATES:]
-        second, _, _ = accelerations(
-            self.body,
-            self.stance,
-            coordinates,
-            rates,
-            offset=self.shift.at(time),
-            is_held=self.is_held,
-        )
-        return np.concatenate([rates, second])
-
-    def forces(self, time: float, y: Vector) -> ContactForces:
-        _, multipliers, _ = accelerations(
-            self.body,
-            self.stance,
-            y[:N_COORDINATES],
-            y[N_COORDINATES:],
-            offset=self.shift.at(time),
-            is_held=self.is_held,
-        )
-        return forces_from_multipliers(self.body, multipliers)
-
-    def energies(self, time: float, y: Vector) -> tuple[float, float]:
-        return energy(
-            self.body, self.stance, y[:N_COORDINATES], y[N_COORDINATES:], self.shift.at(time)
-        )
-
-    def pitch(self, y: Vector) -> float:
-        here = evaluate(
-            self.body, self.stance, y[:N_COORDINATES], y[N_COORDINATES:], Offset()
-        )
-        return here.pitch
-
-    def swing_foot(self, y: Vector) -> SwingFoot:
-        return swing_foot(self.body, self.stance, y[:N_COORDINATES])
-
-    def is_foot_in_front(self, y: Vector) -> bool:
-        """Whether meeting the floor here is a heel strike and not a passive leg's scuff near mid-stance."""
-        foot = self.swing_foot(y)
-        if not foot.is_before_vertical_axis or y[SWING_LEG] <= y[STANCE_LEG]:
-            return False
-        return self.is_held or foot.pitch > 0.0 > self.pitch(y)
-
-    def fall(self, y: Vector, forces: ContactForces) -> str | None:
-        pitch = self.pitch(y)
-        if abs(y[_LEAN]) > _FALLEN_ANGLE:
-            return "sideways"
-        if abs(pitch) > _FALLEN_ANGLE:
-            return "backward" if pitch > 0.0 else "forward"
-        return "lift-off" if forces.normal <= 0.0 else None
-
-
-@dataclass(frozen=True)
-class _End:
-    """How a stance phase ended, and its samples."""
-
-    time: float
-    y: Vector
-    fall: str | None
-    times: tuple[float, ...]
-    samples: tuple[Vector, ...]
-    forces: tuple[ContactForces, ...]
 
 
 @dataclass(frozen=True)
@@ -162,7 +77,7 @@ class MultibodyWalker(Body):
 
     def step(
         self,
-        state: Sequence[float],
+        state: Sequence[float] | Vector,
         *,
         stance: str = "left",
         inter_leg_angle: float = 0.3,
@@ -177,13 +92,14 @@ class MultibodyWalker(Body):
         Parameters
         ----------
         state : 5 or 6 floats
-            Heading, stance pitch, ankle angle, stance pitch rate, ankle rate just after heel strike; for a
-            passive swing leg the inter-leg rate may follow.
+            Heading, stance pitch, ankle angle, stance pitch rate, ankle rate just after heel
+            strike; for a passive swing leg the inter-leg rate may follow.
         stance : "left" or "right"
             The foot that stands.
         inter_leg_angle : float
-            Held swing leg: the angle at which it is held from the start. Passive: the angle at which it starts,
-            negative as it is behind (`MultibodyStep.inter_leg_angle` of the step before).
+            Held swing leg: the angle at which it is held from the start. Passive: the angle at
+            which it starts, negative as it is behind (`MultibodyStep.inter_leg_angle` of the step
+            before).
         mass_offset : float
             Offset of the hip masses along the axle, positive to the right.
         previous_offset : float, optional
@@ -214,18 +130,18 @@ class MultibodyWalker(Body):
             swing=swing,
             swing_rate=swing_rate,
         )
-        end = _integrate(phase, start, self.tolerance)
+        end = integrate(phase, start, self.tolerance)
         kept = _trajectory(phase, end) if trajectory else None
         return _result(phase, start, end, kept)
 
     def stance_accelerations(
-        self, state: Sequence[float], **options: float | str | None
+        self, state: Sequence[float] | Vector, **options: Any
     ) -> tuple[float, ...]:
         """Second derivatives of stance pitch and ankle, and of the inter-leg angle if passive.
 
         Arguments and errors as for `step`; evaluated at the start of the step.
         """
-        phase, y = self._start(state, **options)  # type: ignore[arg-type]
+        phase, y = self._start(state, **options)
         second, _, here = accelerations(
             self,
             phase.stance,
@@ -240,16 +156,14 @@ class MultibodyWalker(Body):
             return independent
         return (*independent, float(second[SWING_LEG] - second[STANCE_LEG]))
 
-    def contact_forces(
-        self, state: Sequence[float], **options: float | str | None
-    ) -> ContactForces:
+    def contact_forces(self, state: Sequence[float] | Vector, **options: Any) -> ContactForces:
         """Contact forces at the start of a step. Arguments and errors as for `step`."""
-        phase, y = self._start(state, **options)  # type: ignore[arg-type]
+        phase, y = self._start(state, **options)
         return phase.forces(0.0, y)
 
     def _start(
         self,
-        state: Sequence[float],
+        state: Sequence[float] | Vector,
         *,
         stance: str = "left",
         inter_leg_angle: float = 0.3,
@@ -257,7 +171,7 @@ class MultibodyWalker(Body):
         previous_offset: float | None = None,
         swing: SwingMode = "held",
         swing_rate: float | None = None,
-    ) -> tuple[_Phase, Vector]:
+    ) -> tuple[Phase, Vector]:
         if stance not in ("left", "right"):
             raise ValueError(f"stance must be 'left' or 'right', got {stance!r}")
         if swing not in ("held", "passive"):
@@ -279,7 +193,7 @@ class MultibodyWalker(Body):
             )
         heading, pitch, ankle, pitch_rate, ankle_rate = numbers[:5]
         standing = Stance(1.0 if stance == "left" else -1.0, heading)
-        phase = _Phase(self, standing, Shift(before, mass_offset, self.shift_time), is_held)
+        phase = Phase(self, standing, Shift(before, mass_offset, self.shift_time), is_held)
         coordinates = place(self, standing, pitch, ankle, inter_leg_angle)
         rates = rates_from_section(
             self, standing, coordinates, pitch_rate, ankle_rate, inter_leg_rate
@@ -287,9 +201,7 @@ class MultibodyWalker(Body):
         return phase, np.concatenate([coordinates, rates])
 
 
-def _inter_leg_rate(
-    state: tuple[float, ...], is_held: bool, swing_rate: float | None
-) -> float:
+def _inter_leg_rate(state: tuple[float, ...], is_held: bool, swing_rate: float | None) -> float:
     if is_held:
         if len(state) != 5:
             raise ValueError(f"state of a held step must have 5 entries, got {len(state)}")
@@ -307,80 +219,6 @@ def _inter_leg_rate(
     )
 
 
-def _integrate(phase: _Phase, start: Vector, tolerance: float) -> _End:
-    times, samples = [0.0], [start]
-    forces = [phase.forces(0.0, start)]
-
-    def end(time: float, y: Vector, fall: str | None) -> _End:
-        if time > times[-1]:
-            times.append(time)
-            samples.append(y)
-            forces.append(phase.forces(time, y))
-        return _End(time, y, fall, tuple(times), tuple(samples), tuple(forces))
-
-    if phase.is_held and phase.swing_foot(start).clearance <= 0.0:
-        return end(0.0, start, "trip")
-    solver = DOP853(
-        phase.derivative, 0.0, start, _LONGEST_STEP, rtol=tolerance, atol=0.1 * tolerance
-    )
-    while solver.status == "running":
-        origin = (solver.t, solver.y)
-        message = solver.step()
-        if solver.status == "failed":
-            raise RuntimeError(f"the integrator gave up at t = {solver.t:.6g}: {message}")
-        dense = solver.dense_output()
-        for time in np.linspace(origin[0], solver.t, _SAMPLES_PER_STEP + 1)[1:].tolist():
-            y = dense(time)
-            before = phase.swing_foot(samples[-1]).clearance
-            if before > 0.0 >= phase.swing_foot(y).clearance:
-                strike = _locate(phase, dense, (times[-1], time))
-                if phase.is_foot_in_front(dense(strike)):
-                    return end(*_polish(phase, dense, origin, strike, tolerance), None)
-            force = phase.forces(time, y)
-            times.append(time)
-            samples.append(y)
-            forces.append(force)
-            fall = phase.fall(y, force)
-            if fall is not None:
-                return end(time, y, fall)
-    return end(solver.t, solver.y, "no heel strike")
-
-
-def _locate(
-    phase: _Phase, dense: Callable[[float], Vector], bracket: tuple[float, float]
-) -> float:
-    def clearance(time: float) -> float:
-        return phase.swing_foot(dense(time)).clearance
-
-    if clearance(bracket[0]) <= 0.0:
-        return bracket[0]
-    return float(brentq(clearance, *bracket, xtol=1e-14, rtol=1e-14))  # type: ignore[arg-type]
-
-
-def _polish(
-    phase: _Phase,
-    dense: Callable[[float], Vector],
-    origin: tuple[float, Vector],
-    strike: float,
-    tolerance: float,
-) -> tuple[float, Vector]:
-    """Take the located strike from the interpolant's accuracy to the integrator's."""
-    solution = solve_ivp(
-        phase.derivative,
-        (origin[0], strike),
-        origin[1],
-        method="DOP853",
-        rtol=tolerance,
-        atol=0.1 * tolerance,
-    )
-    y = solution.y[:, -1]
-    # Only the slope of a correction of about the tolerance: a difference over 1e-4 is more than enough.
-    width = 1e-4
-    ahead, behind = (phase.swing_foot(dense(strike + h)).clearance for h in (width, -width))
-    correction = -phase.swing_foot(y).clearance * 2.0 * width / (ahead - behind)
-    return strike + correction, y + correction * phase.derivative(strike, y)
-
-
 def _extremes(forces: tuple[ContactForces, ...]) -> ForceExtremes:
     return ForceExtremes(
         least_normal=min(force.normal for force in forces),
@@ -393,7 +231,7 @@ def _extremes(forces: tuple[ContactForces, ...]) -> ForceExtremes:
 def _section(
     body: Body, stance: Stance, y: Vector, *, is_held: bool
 ) -> tuple[tuple[float, ...], float, float]:
-    """Section state, inter-leg angle and its rate at role coordinates and rates ``y``, shape (16,)."""
+    """Section state, inter-leg angle and its rate at coordinates and rates ``y`` (16,)."""
     coordinates, rates = y[:N_COORDINATES], y[N_COORDINATES:]
     here = evaluate(body, stance, coordinates, rates, Offset())
     inter_leg_rate = float(rates[SWING_LEG] - rates[STANCE_LEG])
@@ -408,7 +246,7 @@ def _section(
     return (state if is_held else (*state, inter_leg_rate)), angle, inter_leg_rate
 
 
-def _residual(phase: _Phase, y: Vector) -> float:
+def _residual(phase: Phase, y: Vector) -> float:
     here = evaluate(phase.body, phase.stance, y[:N_COORDINATES], y[N_COORDINATES:], Offset())
     drift = here.constraint_jacobian[:, :N_COORDINATES] @ y[N_COORDINATES:]
     return float(max(np.abs(here.constraints).max(), np.abs(drift).max()))
@@ -419,7 +257,7 @@ def _side(stance: Stance) -> str:
 
 
 def _result(
-    phase: _Phase, start: Vector, end: _End, trajectory: Trajectory | None
+    phase: Phase, start: Vector, end: PhaseEnd, trajectory: Trajectory | None
 ) -> MultibodyStep:
     body, offset = phase.body, phase.shift.at(end.time)
     at_start = sum(phase.energies(0.0, start))
@@ -459,15 +297,13 @@ def _result(
     )
 
 
-def _trajectory(phase: _Phase, end: _End) -> Trajectory:
+def _trajectory(phase: Phase, end: PhaseEnd) -> Trajectory:
     is_left = phase.stance.side > 0.0
     coordinates, rates = [], []
     for y in end.samples:
         role, role_rates = y[:N_COORDINATES], y[N_COORDINATES:]
         ahead = sin(role[SWING_LEG] + phase.body.ankle_tilt)
-        swing_ankle = float(
-            np.arctan2(copysign(1.0, ahead) * tan(role[_LEAN]), abs(ahead))
-        )
+        swing_ankle = float(np.arctan2(copysign(1.0, ahead) * tan(role[LEAN]), abs(ahead)))
         ankles = (swing_ankle, role[STANCE_ANKLE])
         order = (SWING_LEG, STANCE_LEG) if is_left else (STANCE_LEG, SWING_LEG)
         coordinates.append([*role[:5], *role[list(order)], *(ankles if is_left else ankles[::-1])])

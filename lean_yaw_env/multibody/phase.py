@@ -1,0 +1,198 @@
+"""One stance phase of the nine-coordinate walker, integrated to heel strike or a fall."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import DOP853, solve_ivp
+from scipy.optimize import root_scalar
+
+from lean_yaw_env.multibody.dynamics import (
+    Body,
+    ContactForces,
+    Offset,
+    Stance,
+    SwingFoot,
+    accelerations,
+    energy,
+    evaluate,
+    forces_from_multipliers,
+    swing_foot,
+)
+from lean_yaw_env.multibody.kinematics import (
+    LEAN,
+    N_COORDINATES,
+    STANCE_LEG,
+    SWING_LEG,
+    Vector,
+)
+from lean_yaw_env.multibody.shift import Shift
+
+_SAMPLES_PER_STEP = 8
+"""Samples within a step of the integrator at which strike, falls and forces are looked at."""
+_LONGEST_STEP = 20.0
+"""Time after which a step without heel strike is given up; a gait's step takes about 1 to 4."""
+_FALLEN_ANGLE = 1.2
+"""Pitch or lean, rad, beyond which no walker of this kind comes back."""
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A stance phase: constants, and what follows from ``y`` = (coordinates, rates), (16,)."""
+
+    body: Body
+    stance: Stance
+    shift: Shift
+    is_held: bool
+
+    def derivative(self, time: float, y: Vector) -> Vector:
+        """Time derivative of ``y``."""
+        coordinates, rates = y[:N_COORDINATES], y[N_COORDINATES:]
+        second, _, _ = accelerations(
+            self.body,
+            self.stance,
+            coordinates,
+            rates,
+            offset=self.shift.at(time),
+            is_held=self.is_held,
+        )
+        return np.concatenate([rates, second])
+
+    def forces(self, time: float, y: Vector) -> ContactForces:
+        """What the floor does to the stance foot."""
+        _, multipliers, _ = accelerations(
+            self.body,
+            self.stance,
+            y[:N_COORDINATES],
+            y[N_COORDINATES:],
+            offset=self.shift.at(time),
+            is_held=self.is_held,
+        )
+        return forces_from_multipliers(self.body, multipliers)
+
+    def energies(self, time: float, y: Vector) -> tuple[float, float]:
+        """Kinetic and potential energy."""
+        return energy(
+            self.body, self.stance, y[:N_COORDINATES], y[N_COORDINATES:], self.shift.at(time)
+        )
+
+    def pitch(self, y: Vector) -> float:
+        """Pitch of the stance foot."""
+        here = evaluate(self.body, self.stance, y[:N_COORDINATES], y[N_COORDINATES:], Offset())
+        return here.pitch
+
+    def swing_foot(self, y: Vector) -> SwingFoot:
+        """Where the swing foot is, turned flat."""
+        return swing_foot(self.body, self.stance, y[:N_COORDINATES])
+
+    def is_foot_in_front(self, y: Vector) -> bool:
+        """Whether meeting the floor here is a heel strike, not a passive leg's mid-stance scuff."""
+        foot = self.swing_foot(y)
+        if not foot.is_before_vertical_axis or y[SWING_LEG] <= y[STANCE_LEG]:
+            return False
+        return self.is_held or foot.pitch > 0.0 > self.pitch(y)
+
+    def fall(self, y: Vector, forces: ContactForces) -> str | None:
+        """The way the walker has fallen, if it has."""
+        pitch = self.pitch(y)
+        if abs(y[LEAN]) > _FALLEN_ANGLE:
+            return "sideways"
+        if abs(pitch) > _FALLEN_ANGLE:
+            return "backward" if pitch > 0.0 else "forward"
+        return "lift-off" if forces.normal <= 0.0 else None
+
+
+@dataclass(frozen=True)
+class PhaseEnd:
+    """How a stance phase ended, and its samples."""
+
+    time: float
+    y: Vector
+    fall: str | None
+    times: tuple[float, ...]
+    samples: tuple[Vector, ...]
+    forces: tuple[ContactForces, ...]
+
+
+def integrate(phase: Phase, start: Vector, tolerance: float) -> PhaseEnd:
+    """Integrate from ``start``, role coordinates and rates (16,), to heel strike or a fall.
+
+    Heel strike is located to round-off. A fall is noticed on the samples and not located further.
+
+    Raises
+    ------
+    RuntimeError
+        If the integrator fails.
+    """
+    times, samples = [0.0], [start]
+    forces = [phase.forces(0.0, start)]
+
+    def end(time: float, y: Vector, fall: str | None) -> PhaseEnd:
+        if time > times[-1]:
+            times.append(time)
+            samples.append(y)
+            forces.append(phase.forces(time, y))
+        return PhaseEnd(time, y, fall, tuple(times), tuple(samples), tuple(forces))
+
+    if phase.is_held and phase.swing_foot(start).clearance <= 0.0:
+        return end(0.0, start, "trip")
+    solver = DOP853(
+        phase.derivative, 0.0, start, _LONGEST_STEP, rtol=tolerance, atol=0.1 * tolerance
+    )
+    while solver.status == "running":
+        origin = (solver.t, solver.y)
+        message = solver.step()
+        if solver.status == "failed":
+            raise RuntimeError(f"the integrator gave up at t = {solver.t:.6g}: {message}")
+        dense = solver.dense_output()
+        for time in np.linspace(origin[0], solver.t, _SAMPLES_PER_STEP + 1)[1:].tolist():
+            y = dense(time)
+            before = phase.swing_foot(samples[-1]).clearance
+            if before > 0.0 >= phase.swing_foot(y).clearance:
+                strike = _locate(phase, dense, (times[-1], time))
+                if phase.is_foot_in_front(dense(strike)):
+                    return end(*_polish(phase, dense, origin, strike, tolerance), None)
+            force = phase.forces(time, y)
+            times.append(time)
+            samples.append(y)
+            forces.append(force)
+            fall = phase.fall(y, force)
+            if fall is not None:
+                return end(time, y, fall)
+    return end(solver.t, solver.y, "no heel strike")
+
+
+def _locate(phase: Phase, dense: Callable[[float], Vector], bracket: tuple[float, float]) -> float:
+    def clearance(time: float) -> float:
+        return phase.swing_foot(dense(time)).clearance
+
+    if clearance(bracket[0]) <= 0.0:
+        return bracket[0]
+    found = root_scalar(clearance, bracket=bracket, method="brentq", xtol=1e-14, rtol=1e-14)
+    return float(found.root)
+
+
+def _polish(
+    phase: Phase,
+    dense: Callable[[float], Vector],
+    origin: tuple[float, Vector],
+    strike: float,
+    tolerance: float,
+) -> tuple[float, Vector]:
+    """Take the located strike from the interpolant's accuracy to the integrator's."""
+    solution = solve_ivp(
+        phase.derivative,
+        (origin[0], strike),
+        origin[1],
+        method="DOP853",
+        rtol=tolerance,
+        atol=0.1 * tolerance,
+    )
+    y = solution.y[:, -1]
+    # Only the slope of a correction of about the tolerance: a wide difference is good enough.
+    width = 1e-4
+    ahead, behind = (phase.swing_foot(dense(strike + h)).clearance for h in (width, -width))
+    correction = -phase.swing_foot(y).clearance * 2.0 * width / (ahead - behind)
+    return strike + correction, y + correction * phase.derivative(strike, y)
