@@ -19,7 +19,7 @@ from numba import njit
 # A division by zero gives inf or nan as in C: Python's exception would be a branch, and a branch stops vectorisation.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 
-inlined: Callable[[Callable[..., Any]], Any] = njit(forceinline=True, **_OPTIONS)
+inlined = njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
 
 
 def _sources_digest() -> str:

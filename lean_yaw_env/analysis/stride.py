@@ -1,0 +1,147 @@
+"""The stride map (two steps, left foot to left foot) and its exact Jacobian; eqs. (6) and (7) of the paper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lean_yaw_env.errors import FellError
+from lean_yaw_env.kernel.jacobian import INPUTS, step_jacobian
+from lean_yaw_env.kernel.records import Command
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, STATE_SIZE, Vector, require_state
+from lean_yaw_env.walker import (
+    FALL_OF_STATUS,
+    OTHER_FOOT,
+    SIDE,
+    Foot,
+    StepResult,
+    Walker,
+    raise_for_failure,
+    require_command,
+    require_completed,
+)
+
+
+@dataclass(frozen=True)
+class StrideJacobian:
+    """The stride map and its derivatives at a point of the section.
+
+    Attributes
+    ----------
+    state : shape (5,)
+        Section state after the stride.
+    matrix : shape (5, 5)
+        Derivatives by the section state; entry (i, j) has unit(i) / unit(j).
+    by_inter_leg_angle, by_mass_offset : shape (5,)
+        Derivatives by the two commands, held over the stride.
+    """
+
+    state: Vector
+    matrix: Vector
+    by_inter_leg_angle: Vector
+    by_mass_offset: Vector
+
+
+@dataclass(frozen=True)
+class Step:
+    """The derivatives of one walking step.
+
+    Attributes
+    ----------
+    state : shape (5,)
+    by_state : shape (5, 5)
+    by_inter_leg_angle, by_mass_offset, by_previous_offset : shape (5,)
+    """
+
+    state: Vector
+    by_state: Vector
+    by_inter_leg_angle: Vector
+    by_mass_offset: Vector
+    by_previous_offset: Vector
+
+
+def differentiate_step(walker: Walker, state: ArrayLike, stance: Foot, command: Command) -> Step:
+    """One walking step with its exact derivatives (complex step through the kernel; the landing time's share included).
+
+    Raises
+    ------
+    FellError
+        If the walker does not complete the step; names the way it fell.
+    """
+    start = require_state(state)
+    after = np.empty(STATE_SIZE)
+    jacobian = np.empty((STATE_SIZE, INPUTS))
+    status = step_jacobian(
+        walker.parameters.body(), command, *start.tolist(), SIDE[stance], after, jacobian
+    )
+    raise_for_failure(status, start, walker.parameters)
+    if status in FALL_OF_STATUS:
+        raise FellError(
+            f"the walker fell {FALL_OF_STATUS[status].value} in the step on its {stance} foot"
+        )
+    return Step(after, jacobian[:, :5], jacobian[:, 5], jacobian[:, 6], jacobian[:, 7])
+
+
+def stride_map(
+    walker: Walker,
+    state: ArrayLike,
+    *,
+    inter_leg_angle: float = INTER_LEG_ANGLE,
+    mass_offset: float = 0.0,
+) -> tuple[StepResult, StepResult]:
+    """The two steps of a stride that starts on the left foot, at a constant command; the section state is the second one's.
+
+    Raises
+    ------
+    FellError
+        If the walker does not complete the stride; names the step and the way it fell.
+    ValueError
+        If an argument is outside its range.
+    """
+    first = require_completed(
+        walker.step(state, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset),
+        "the stride's first step",
+    )
+    second = require_completed(
+        walker.step(
+            first.state,
+            stance=first.stance,
+            inter_leg_angle=inter_leg_angle,
+            mass_offset=mass_offset,
+        ),
+        "the stride's second step",
+    )
+    return first, second
+
+
+def stride_jacobian(
+    walker: Walker,
+    state: ArrayLike,
+    *,
+    inter_leg_angle: float = INTER_LEG_ANGLE,
+    mass_offset: float = 0.0,
+) -> StrideJacobian:
+    """Linearise the stride map at a point of the heel-strike section, left stance.
+
+    At a fixed point the matrix's eigenvalues are the gait's Floquet multipliers; elsewhere they mean nothing of the kind.
+
+    Raises
+    ------
+    FellError
+        If the walker does not complete the stride.
+    ValueError
+        If an argument is outside its range.
+    """
+    command = require_command(inter_leg_angle, mass_offset, None)
+    first = differentiate_step(walker, state, "left", command)
+    second = differentiate_step(walker, first.state, OTHER_FOOT["left"], command)
+    return StrideJacobian(
+        state=second.state,
+        matrix=second.by_state @ first.by_state,
+        by_inter_leg_angle=second.by_state @ first.by_inter_leg_angle + second.by_inter_leg_angle,
+        by_mass_offset=second.by_state @ (first.by_mass_offset + first.by_previous_offset)
+        + second.by_mass_offset
+        + second.by_previous_offset,
+    )

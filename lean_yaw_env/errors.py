@@ -1,0 +1,19 @@
+"""Named failures, each saying what to do about it."""
+
+from __future__ import annotations
+
+
+class LeanYawError(Exception):
+    """Base of every error that is the walker's own."""
+
+
+class FellError(LeanYawError):
+    """A walker fell where a completed step was needed; try a steeper slope, a smaller disturbance or a smaller command."""
+
+
+class NoGaitError(LeanYawError):
+    """No limit cycle was found; the message lists what was tried. Try a steeper slope or a smaller inter-leg angle or offset."""
+
+
+class SolverError(LeanYawError):
+    """The integrator or the landing's solver gave up, which is a fault and not a fall; please report state and parameters."""

@@ -1,0 +1,393 @@
+"""The walker for people: parameters in, walking steps and walks out. The physics is in ``lean_yaw_env.kernel``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lean_yaw_env.errors import FellError, SolverError
+from lean_yaw_env.kernel import records
+from lean_yaw_env.kernel.records import Body, Command, Outcome
+from lean_yaw_env.kernel.step import step as step_kernel
+from lean_yaw_env.kernel.trace import COLUMNS, trace
+from lean_yaw_env.parameters import (
+    INTER_LEG_ANGLE,
+    Foot,
+    Vector,
+    WalkerParameters,
+    require_foot,
+    require_inter_leg_angle,
+    require_mass_offset,
+    require_number,
+    require_state,
+)
+
+SIDE: dict[Foot, float] = {"left": 1.0, "right": -1.0}
+OTHER_FOOT: dict[Foot, Foot] = {"left": "right", "right": "left"}
+
+
+class Fall(str, Enum):
+    """The ways to fall, each by a physical criterion; members compare equal to their names."""
+
+    BACKWARD = "backward"
+    """The stance leg moves backward and accelerates backward: it does not pass mid-stance."""
+    SIDEWAYS = "sideways"
+    """An ankle, of the stance foot or of the swing foot to be laid flat, would have to turn past a right angle, or the walker
+    comes down on its swing foot without moving forward onto it."""
+    TRIP = "trip"
+    """The swing foot, put in front, is at or below the floor when the step starts."""
+    LIFT_OFF = "lift-off"
+    """The normal force of the floor on the stance foot vanishes."""
+    SLIP = "slip"
+    """The step demands more friction than ``friction_limit``."""
+    NO_HEEL_STRIKE = "no-heel-strike"
+    """The swing foot does not come down within ``max_step_duration``."""
+
+
+FALL_OF_STATUS: dict[float, Fall] = {
+    records.BACKWARD: Fall.BACKWARD,
+    records.SIDEWAYS: Fall.SIDEWAYS,
+    records.TRIP: Fall.TRIP,
+    records.LIFT_OFF: Fall.LIFT_OFF,
+    records.SLIP: Fall.SLIP,
+    records.NO_STRIKE: Fall.NO_HEEL_STRIKE,
+}
+
+
+class EnergyLedger(NamedTuple):
+    """Where a step's energy came from and went, in weight times leg length.
+
+    The kinetic energy just after heel strike changes from step to step by ``gravity_work + shift_work - impact_loss - ankle_loss``.
+    """
+
+    gravity_work: float
+    """Work of gravity on the way to the heel strike: on a walk down a slope, what the slope gives."""
+    shift_work: float
+    """Work put in by moving the masses along the axle."""
+    impact_loss: float
+    """Kinetic energy lost at heel strike."""
+    ankle_loss: float
+    """Energy that went into the stance ankle's spring and damper."""
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """One walking step.
+
+    Attributes
+    ----------
+    state : shape (5,)
+        Section state just after the heel strike, or where the walker was when it fell.
+    stance : "left" or "right"
+        The foot that stands in ``state``.
+    duration : float
+        From heel strike to heel strike, in units of sqrt(leg length / gravity).
+    displacement : shape (2,)
+        From the old to the new contact reference point: downhill (x) and to the right of someone facing downhill (z).
+    heading_change : float
+        Of the stance foot's heading, rad, positive to the left.
+    mass_offset : float
+        Offset in force at the end; a heel strike in mid-shift locks the masses where they are.
+    fall : Fall or None
+    normal_force, friction_demand : float
+        Least normal force (in weights) and greatest ratio of tangential to normal force, among the instants at which the integrator looked.
+    energy : EnergyLedger
+    evaluations : int
+        How often the equations of motion were evaluated.
+    """
+
+    state: Vector
+    stance: Foot
+    duration: float
+    displacement: Vector
+    heading_change: float
+    mass_offset: float
+    fall: Fall | None
+    normal_force: float
+    friction_demand: float
+    energy: EnergyLedger
+    evaluations: int
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A sequence of walking steps; ``n`` of them were completed.
+
+    Attributes
+    ----------
+    states : shape (n + 1, 5)
+        Section states, the first being the start.
+    stances : n + 1 feet
+    footprints : shape (n + 1, 2)
+        Contact reference points on the floor, (downhill, right), the first at the origin.
+    durations : shape (n,)
+    mass_offsets : shape (n + 1,)
+        Offsets in force at each heel strike.
+    energies : n ledgers
+    path : shape (m, 4)
+        Time, and the centre of mass downhill, up and right, sampled within the steps; empty unless asked for.
+    fall : Fall or None
+        How the walk ended, if not by its number of steps.
+    """
+
+    states: Vector
+    stances: tuple[Foot, ...]
+    footprints: Vector
+    durations: Vector
+    mass_offsets: Vector
+    energies: tuple[EnergyLedger, ...]
+    path: Vector
+    fall: Fall | None
+
+    @property
+    def headings(self) -> Vector:
+        """Heading of each footprint, rad; shape (n + 1,)."""
+        return self.states[:, 0]
+
+    @property
+    def n_steps(self) -> int:
+        return len(self.durations)
+
+    @property
+    def distance(self) -> float:
+        """Straight-line distance between the first and the last footprint, in leg lengths."""
+        return float(np.linalg.norm(self.footprints[-1] - self.footprints[0]))
+
+
+@dataclass(frozen=True)
+class Walker:
+    """The active three-dimensional walker of the paper (Figure 6 C and E): exact steps from heel strike to heel strike."""
+
+    parameters: WalkerParameters = WalkerParameters()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.parameters, WalkerParameters):
+            raise ValueError(f"parameters must be WalkerParameters, not {self.parameters!r}")
+
+    def step(
+        self,
+        state: ArrayLike,
+        *,
+        stance: Foot = "left",
+        inter_leg_angle: float = INTER_LEG_ANGLE,
+        mass_offset: float = 0.0,
+        previous_offset: float | None = None,
+    ) -> StepResult:
+        """Walk one step.
+
+        Parameters
+        ----------
+        state : shape (5,)
+            Section state just after heel strike, in the order and units of ``STATE_FIELDS``.
+        stance : "left" or "right"
+        inter_leg_angle : (0, pi/2)
+            Swing leg's pitch in front of the stance leg's, rad.
+        mass_offset : [-1, 1]
+            Offset of both hip masses along the axle, positive to the right, in leg lengths.
+        previous_offset : [-1, 1], optional
+            Where the masses are when the step starts; they move to ``mass_offset`` in ``shift_time``. By default they are there already.
+
+        Raises
+        ------
+        ValueError
+            If an argument is outside its range.
+        SolverError
+            If the integrator fails; never for a fall, which is a result.
+        """
+        start = require_state(state)
+        foot = require_foot(stance)
+        command = require_command(inter_leg_angle, mass_offset, previous_offset)
+        outcome = step_kernel(self.parameters.body(), command, *start.tolist(), SIDE[foot])
+        return _result(outcome, foot, start, self.parameters)
+
+    def walk(
+        self,
+        n_steps: int,
+        *,
+        state: ArrayLike,
+        stance: Foot = "left",
+        inter_leg_angle: float | Sequence[float] | NDArray[np.float64] = INTER_LEG_ANGLE,
+        mass_offset: float | Sequence[float] | NDArray[np.float64] = 0.0,
+        previous_offset: float | None = None,
+        samples_per_step: int = 0,
+    ) -> Walk:
+        """Walk ``n_steps`` steps, or until a fall.
+
+        Parameters
+        ----------
+        n_steps : int >= 1
+        state, stance : see ``step``
+            The start; ``find_limit_cycle(walker).state`` is the gait.
+        inter_leg_angle, mass_offset : float, or one per step
+        previous_offset : see ``step``
+            For the first step.
+        samples_per_step : 0 or >= 2
+            Instants per step at which ``Walk.path`` holds the centre of mass.
+
+        Raises
+        ------
+        ValueError, SolverError
+            As ``step``.
+        """
+        require_number("n_steps", n_steps, 1, 10_000_000)
+        if samples_per_step != 0:
+            require_number("samples_per_step", samples_per_step, 2, 10_000)
+        foot = require_foot(stance)
+        current = require_state(state)
+        angles = _per_step("inter_leg_angle", inter_leg_angle, n_steps)
+        offsets = _per_step("mass_offset", mass_offset, n_steps)
+        commands = [require_command(a, m, None) for a, m in zip(angles, offsets, strict=True)]
+        before = require_command(angles[0], offsets[0], previous_offset).offset_before
+
+        states, stances, footprints = [current], [foot], [np.zeros(2)]
+        durations: list[float] = []
+        in_force, energies, path = [before], [], []
+        fall = None
+        for command in commands:
+            moved = command._replace(offset_before=in_force[-1])
+            outcome = step_kernel(self.parameters.body(), moved, *current.tolist(), SIDE[foot])
+            result = _result(outcome, foot, current, self.parameters)
+            if samples_per_step:
+                rows = self._trace(current, foot, moved, result.duration, samples_per_step)
+                path.append(_centre_path(rows, current[0], footprints[-1], sum(durations)))
+            if result.fall is not None:
+                fall = result.fall
+                break
+            current, foot = result.state, result.stance
+            states.append(current)
+            stances.append(foot)
+            footprints.append(footprints[-1] + result.displacement)
+            durations.append(result.duration)
+            in_force.append(result.mass_offset)
+            energies.append(result.energy)
+        return Walk(
+            states=np.array(states),
+            stances=tuple(stances),
+            footprints=np.array(footprints),
+            durations=np.array(durations),
+            mass_offsets=np.array(in_force),
+            energies=tuple(energies),
+            path=np.concatenate(path) if path else np.empty((0, 4)),
+            fall=fall,
+        )
+
+    def stance_motion(
+        self,
+        state: ArrayLike,
+        *,
+        duration: float,
+        samples: int = 50,
+        stance: Foot = "left",
+        inter_leg_angle: float = INTER_LEG_ANGLE,
+        mass_offset: float = 0.0,
+        previous_offset: float | None = None,
+    ) -> dict[str, Vector]:
+        """The motion within a step at uniform times: coordinates, centre of mass, contact force, energy.
+
+        Parameters
+        ----------
+        state, stance, inter_leg_angle, mass_offset, previous_offset : see ``step``
+        duration : (0, 100]
+            How far to follow the stance phase, usually ``StepResult.duration``; the floor under the swing foot is not looked at.
+        samples : int >= 2
+
+        Returns
+        -------
+        dict
+            One array of shape (samples,) for each of ``lean_yaw_env.kernel.trace.COLUMNS``.
+
+        Raises
+        ------
+        ValueError
+            If an argument is outside its range.
+        """
+        require_number("duration", duration, 0.0, 100.0, "(]")
+        require_number("samples", samples, 2, 1_000_000)
+        command = require_command(inter_leg_angle, mass_offset, previous_offset)
+        rows = self._trace(
+            require_state(state), require_foot(stance), command, float(duration), int(samples)
+        )
+        return {name: rows[:, i].copy() for i, name in enumerate(COLUMNS)}
+
+    def _trace(
+        self, state: Vector, stance: Foot, command: Command, duration: float, samples: int
+    ) -> Vector:
+        rows = np.zeros((samples, len(COLUMNS)))
+        trace(self.parameters.body(), command, *state.tolist(), SIDE[stance], duration, rows)
+        return rows
+
+
+def require_command(
+    inter_leg_angle: float, mass_offset: float, previous_offset: float | None
+) -> Command:
+    """A step's command as the kernels take it, or ``ValueError``."""
+    offset = require_mass_offset(mass_offset)
+    before = (
+        offset
+        if previous_offset is None
+        else require_mass_offset(previous_offset, "previous_offset")
+    )
+    return Command(require_inter_leg_angle(inter_leg_angle), offset, before)
+
+
+def require_completed(result: StepResult, what: str) -> StepResult:
+    """Return a completed step, or raise ``FellError`` saying how the walker fell in ``what``."""
+    if result.fall is not None:
+        raise FellError(f"the walker fell {result.fall.value} in {what}")
+    return result
+
+
+def raise_for_failure(status: float, state: Vector, parameters: WalkerParameters | Body) -> None:
+    """Raise ``SolverError`` if a kernel gave up."""
+    if status == records.FAILED:
+        raise SolverError(f"the step from {state.tolist()} of {parameters} did not converge")
+
+
+def _result(
+    outcome: Outcome, foot: Foot, start: Vector, parameters: WalkerParameters
+) -> StepResult:
+    raise_for_failure(outcome.status, start, parameters)
+    fall = FALL_OF_STATUS.get(outcome.status)
+    return StepResult(
+        state=np.array(outcome[:5]),
+        stance=foot if fall else OTHER_FOOT[foot],
+        duration=outcome.duration,
+        displacement=np.array([outcome.displacement_x, outcome.displacement_z]),
+        heading_change=outcome.heading_change,
+        mass_offset=outcome.offset,
+        fall=fall,
+        normal_force=outcome.least_normal_force,
+        friction_demand=outcome.greatest_friction,
+        energy=EnergyLedger(
+            outcome.gravity_work, outcome.shift_work, outcome.impact_loss, outcome.ankle_loss
+        ),
+        evaluations=int(outcome.evaluations),
+    )
+
+
+def _per_step(name: str, value: float | Sequence[float] | Vector, n_steps: int) -> list[float]:
+    array = np.asarray(value, dtype=float)
+    if array.ndim == 0:
+        return [float(array)] * n_steps
+    if array.shape != (n_steps,):
+        raise ValueError(f"{name} must be one number or {n_steps} of them, not shape {array.shape}")
+    return array.tolist()
+
+
+def _centre_path(rows: Vector, heading: float, footprint: Vector, time: float) -> Vector:
+    """Times and positions of the centre of mass in the floor frame from a trace in the stance frame."""
+    cosine, sine = np.cos(heading), np.sin(heading)
+    ahead, up, right = (rows[:, COLUMNS.index(f"centre_{axis}")] for axis in "xyz")
+    return np.column_stack(
+        [
+            rows[:, 0] + time,
+            footprint[0] + cosine * ahead + sine * right,
+            up,
+            footprint[1] - sine * ahead + cosine * right,
+        ]
+    )
