@@ -5,6 +5,12 @@ Lagrange multipliers, derivatives by sympy and integration by scipy. Needs sympy
 """
 
 from lean_yaw_env.multibody.dynamics import ContactForces
+from lean_yaw_env.multibody.gait import (
+    PassiveGait,
+    Table3Column,
+    find_passive_gait,
+    table3_c_eigenvalues,
+)
 from lean_yaw_env.multibody.results import FALLS, ForceExtremes, MultibodyStep, Trajectory
 from lean_yaw_env.multibody.walker import MultibodyWalker
 
@@ -14,5 +20,9 @@ __all__ = [
     "ForceExtremes",
     "MultibodyStep",
     "MultibodyWalker",
+    "PassiveGait",
+    "Table3Column",
     "Trajectory",
+    "find_passive_gait",
+    "table3_c_eigenvalues",
 ]

@@ -53,7 +53,7 @@ class Body:
         limits = {
             "hip_width": (0.0 <= self.hip_width < inf, "a finite number >= 0"),
             "foot_radius": (0.0 <= self.foot_radius < 1.0, "in [0, 1)"),
-            "ankle_tilt": (0.0 < self.ankle_tilt < pi / 2, "in (0, pi/2)"),
+            "ankle_tilt": (0.0 < self.ankle_tilt <= pi / 2, "in (0, pi/2]"),
             "slope": (-pi / 2 < self.slope < pi / 2, "in (-pi/2, pi/2)"),
             "foot_mass": (0.0 < self.foot_mass < inf, "a finite number > 0"),
         }

@@ -32,6 +32,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lean_yaw_env.errors import FellError, NoGaitError
 from lean_yaw_env.multibody.kinematics import Vector
 from lean_yaw_env.multibody.results import MultibodyStep
 from lean_yaw_env.multibody.walker import MultibodyWalker
@@ -58,10 +59,6 @@ _MIRROR = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0])
 _LATERAL = (0, 2, 4)
 _FORE_AFT = (1, 3, 5, 6)
 _TABLE_3_GUESS = np.array([0.0, 0.153, 0.0, -0.1222, 0.0, 0.0028, -0.306])
-
-
-class NoPassiveGaitError(RuntimeError):
-    """No passive gait was found from the given guess; the message says what was tried."""
 
 
 @dataclass(frozen=True)
@@ -95,14 +92,12 @@ def mirrored_passive_step(walker: MultibodyWalker, state: Vector) -> tuple[Vecto
 
     Raises
     ------
-    NoPassiveGaitError
+    FellError
         If the walker falls; names the way.
     """
     step = walker.step(state[:6], inter_leg_angle=float(state[6]), swing="passive")
     if step.fall is not None:
-        raise NoPassiveGaitError(
-            f"the step from {np.array2string(state, precision=6)} fell: {step.fall}"
-        )
+        raise FellError(f"the step from {np.array2string(state, precision=6)} fell: {step.fall}")
     return _MIRROR * np.array([*step.state, step.inter_leg_angle]), step
 
 
@@ -140,31 +135,45 @@ def find_passive_gait(
         Half-width of the central differences.
     residual : float
         Largest entry of the fixed-point equation that is accepted.
+    max_iterations : int
+        Newton steps before giving up.
 
     Raises
     ------
     ValueError
         If ``guess`` has another shape.
-    NoPassiveGaitError
+    NoGaitError
         If the walker falls on the way or the iteration does not converge.
     """
-    state = np.array(guess, dtype=np.float64)
-    if state.shape != (len(PASSIVE_STATE_FIELDS),):
-        raise ValueError(f"guess must have shape (7,), got {state.shape}")
-    error = np.inf
-    for _ in range(max_iterations):
+    start = np.array(guess, dtype=np.float64)
+    if start.shape != (len(PASSIVE_STATE_FIELDS),):
+        raise ValueError(f"guess must have shape (7,), got {start.shape}")
+    tried = f"Newton's method from {np.array2string(start, precision=6)}"
+    try:
+        gait = _newton(walker, start, difference, residual, max_iterations)
+    except FellError as fell:
+        raise NoGaitError(f"{tried}: {fell}") from fell
+    if gait.residual > residual:
+        raise NoGaitError(
+            f"{tried} did not converge in {max_iterations} iterations: residual {gait.residual:.3g}"
+        )
+    return gait
+
+
+def _newton(
+    walker: MultibodyWalker, state: Vector, difference: float, residual: float, iterations: int
+) -> PassiveGait:
+    """The last iterate, whether or not it met ``residual``."""
+    while True:
         after, step = mirrored_passive_step(walker, state)
         error = float(np.abs(after - state).max())
         jacobian = _step_jacobian(walker, state, difference)
-        if error <= residual:
+        if error <= residual or iterations <= 0:
             stride = jacobian @ jacobian
             return PassiveGait(state, step, _by_magnitude(stride), stride, error)
         change = np.linalg.solve(np.eye(len(state)) - jacobian, after - state)
         state = state + np.asarray(change, dtype=np.float64)
-    raise NoPassiveGaitError(
-        f"Newton's method did not converge in {max_iterations} iterations from "
-        f"{np.array2string(np.array(guess), precision=6)}: residual {error:.3g}"
-    )
+        iterations -= 1
 
 
 @dataclass(frozen=True)
@@ -199,12 +208,11 @@ def table3_c_eigenvalues(
     ------
     ValueError
         If a parameter is out of range.
-    NoPassiveGaitError
+    NoGaitError
         If there is no gait near the paper's, stance pitch 0.15.
     """
     walker = MultibodyWalker(0.0, 0.5, ankle_tilt, slope, foot_mass=foot_mass)
     gait = find_passive_gait(walker, _TABLE_3_GUESS, difference=difference)
-
     stride = gait.stride_jacobian
     return Table3Column(
         foot_mass,

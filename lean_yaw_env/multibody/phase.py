@@ -9,6 +9,7 @@ import numpy as np
 from scipy.integrate import DOP853, solve_ivp
 from scipy.optimize import root_scalar
 
+from lean_yaw_env.errors import SolverError
 from lean_yaw_env.multibody.dynamics import (
     Body,
     ContactForces,
@@ -34,8 +35,8 @@ _SAMPLES_PER_STEP = 8
 """Samples within a step of the integrator at which strike, falls and forces are looked at."""
 _LONGEST_STEP = 20.0
 """Time after which a step without heel strike is given up; a gait's step takes about 1 to 4."""
-_FALLEN_ANGLE = 1.2
-"""Pitch or lean, rad, beyond which no walker of this kind comes back."""
+_FALLEN_ANGLE = 0.8
+"""Pitch or lean, rad, taken as fallen; a point mass tipping from rest lifts off at arccos(2/3)."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ def integrate(phase: Phase, start: Vector, tolerance: float) -> PhaseEnd:
 
     Raises
     ------
-    RuntimeError
+    SolverError
         If the integrator fails.
     """
     times, samples = [0.0], [start]
@@ -145,7 +146,7 @@ def integrate(phase: Phase, start: Vector, tolerance: float) -> PhaseEnd:
         origin = (solver.t, solver.y)
         message = solver.step()
         if solver.status == "failed":
-            raise RuntimeError(f"the integrator gave up at t = {solver.t:.6g}: {message}")
+            raise SolverError(f"the integrator gave up at t = {solver.t:.6g}: {message}")
         dense = solver.dense_output()
         for time in np.linspace(origin[0], solver.t, _SAMPLES_PER_STEP + 1)[1:].tolist():
             y = dense(time)
@@ -161,7 +162,7 @@ def integrate(phase: Phase, start: Vector, tolerance: float) -> PhaseEnd:
             fall = phase.fall(y, force)
             if fall is not None:
                 return end(time, y, fall)
-    return end(solver.t, solver.y, "no heel strike")
+    return end(solver.t, solver.y, "no-heel-strike")
 
 
 def _locate(phase: Phase, dense: Callable[[float], Vector], bracket: tuple[float, float]) -> float:

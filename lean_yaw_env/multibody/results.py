@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from lean_yaw_env.multibody.dynamics import ContactForces
 from lean_yaw_env.multibody.kinematics import Vector
 
-FALLS = ("trip", "lift-off", "backward", "forward", "sideways", "no heel strike")
+FALLS = ("trip", "lift-off", "backward", "forward", "sideways", "no-heel-strike")
 """The ways a step can end other than by heel strike."""
 
 
