@@ -23,7 +23,7 @@ from lean_yaw_env.kernel.records import (
     SLIP,
     Flight,
 )
-from lean_yaw_env.kernel.stance import accelerations, contact_force
+from lean_yaw_env.kernel.stance import accelerations, accelerations_and_contact
 from lean_yaw_env.kernel.swing import foot_gap
 
 # Largest estimated error of a step in any coordinate: keeps a walking step within 1e-10 of the exact one (measured: 4e-11).
@@ -74,7 +74,9 @@ def predict_landing(h, gap0, rate0, acceleration0, gap1, rate1, acceleration1):
     turns = (rate0 < 0.0) & (rate1 > 0.0)
     lowest = rate0 / (rate0 - rate1 if turns else 1.0)
     for _ in range(2):
-        slope = a1 + lowest * (2.0 * a2 + lowest * (3.0 * a3 + lowest * (4.0 * a4 + lowest * 5.0 * a5)))
+        slope = a1 + lowest * (
+            2.0 * a2 + lowest * (3.0 * a3 + lowest * (4.0 * a4 + lowest * 5.0 * a5))
+        )
         curvature = 2.0 * a2 + lowest * (6.0 * a3 + lowest * (12.0 * a4 + lowest * 20.0 * a5))
         lowest = lowest - slope / (curvature if curvature > 1e-12 else 1e12)
         lowest = min(max(lowest, 0.0), 1.0)
@@ -147,12 +149,12 @@ def stance_step(c, t, x, b, w, v, dw1, dv1, h):
     v6 = verner.stage_6(v, h, dv1, dv4, dv5)
     x6 = verner.stage_6(x, h, w, w4, w5)
     b6 = verner.stage_6(b, h, v, v4, v5)
-    dw6, dv6 = accelerations(c, t + verner.C6 * h, x6, b6, w6, v6)
+    dw6, dv6, normal6, friction6 = accelerations_and_contact(c, t + verner.C6 * h, x6, b6, w6, v6)
     w7 = verner.stage_7(w, h, dw1, dw4, dw5, dw6)
     v7 = verner.stage_7(v, h, dv1, dv4, dv5, dv6)
     x7 = verner.stage_7(x, h, w, w4, w5, w6)
     b7 = verner.stage_7(b, h, v, v4, v5, v6)
-    dw7, dv7 = accelerations(c, t + verner.C7 * h, x7, b7, w7, v7)
+    dw7, dv7, normal7, friction7 = accelerations_and_contact(c, t + verner.C7 * h, x7, b7, w7, v7)
     w8 = verner.stage_8(w, h, dw1, dw4, dw5, dw6, dw7)
     v8 = verner.stage_8(v, h, dv1, dv4, dv5, dv6, dv7)
     dw8, dv8 = accelerations(
@@ -162,7 +164,7 @@ def stance_step(c, t, x, b, w, v, dw1, dv1, h):
     v9 = verner.stage_9(v, h, dv1, dv4, dv5, dv6, dv7, dv8)
     x9 = verner.stage_9(x, h, w, w4, w5, w6, w7, w8)
     b9 = verner.stage_9(b, h, v, v4, v5, v6, v7, v8)
-    dw9, dv9 = accelerations(c, t + verner.C9 * h, x9, b9, w9, v9)
+    dw9, dv9, normal9, friction9 = accelerations_and_contact(c, t + verner.C9 * h, x9, b9, w9, v9)
     w10 = verner.stage_10(w, h, dw1, dw4, dw5, dw6, dw7, dw8, dw9)
     v10 = verner.stage_10(v, h, dv1, dv4, dv5, dv6, dv7, dv8, dv9)
     dw10, dv10 = accelerations(
@@ -191,9 +193,6 @@ def stance_step(c, t, x, b, w, v, dw1, dv1, h):
     error = max(max(error_x, error_b), max(error_w, error_v))
     loss = c.ankle_damping * verner.result(
         0.0, h, v * v, v6 * v6, v7 * v7, v8 * v8, v9 * v9, v10 * v10, v11 * v11, v12 * v12)
-    normal7, friction7 = contact_force(c, t + verner.C7 * h, x7, b7, w7, v7, dw7, dv7)
-    normal6, friction6 = contact_force(c, t + verner.C6 * h, x6, b6, w6, v6, dw6, dv6)
-    normal9, friction9 = contact_force(c, t + verner.C9 * h, x9, b9, w9, v9, dw9, dv9)
     return (
         verner.result(x, h, w, w6, w7, w8, w9, w10, w11, w12),
         verner.result(b, h, v, v6, v7, v8, v9, v10, v11, v12),
@@ -207,7 +206,7 @@ def stance_step(c, t, x, b, w, v, dw1, dv1, h):
 
 
 @inlined
-def advance(stance, body, flight):
+def advance(stance, flight):
     """Try one integrator step; accept, shorten or repeat it, and say whether the walker lands or falls."""
     h = flight.next_step
     pitch, twist, pitch_rate, twist_rate, error, loss, normal, friction = stance_step(
@@ -216,11 +215,8 @@ def advance(stance, body, flight):
     )  # fmt: skip
     time = flight.time + h
     now = time.real
-    pitch_acceleration, twist_acceleration = accelerations(
+    pitch_acceleration, twist_acceleration, normal_here, friction_here = accelerations_and_contact(
         stance, time, pitch, twist, pitch_rate, twist_rate
-    )
-    normal_here, friction_here = contact_force(
-        stance, time, pitch, twist, pitch_rate, twist_rate, pitch_acceleration, twist_acceleration
     )
     sin_a, cos_a = sine_cosine(pitch + stance.tilt)
     sin_twist, cos_twist = sine_cosine(twist)
@@ -259,11 +255,11 @@ def advance(stance, body, flight):
     rolls_back = (pitch_rate.real >= 0.0) & (pitch_acceleration.real >= 0.0)
     status = FAILED if attempts >= MOST_ATTEMPTS else FLYING
     if accepted:
-        status = NO_STRIKE if now >= body.max_step_duration.real else status
+        status = NO_STRIKE if now >= stance.max_duration.real else status
         status = BACKWARD if rolls_back else status
         status = LANDING if landed else status
         status = SIDEWAYS if (cos_twist.real <= 0.0) | (upright.real <= 0.0) else status
-        status = SLIP if most > body.friction_limit.real * body.friction_limit.real else status
+        status = SLIP if most > stance.friction_limit_squared.real else status
         status = LIFT_OFF if least <= 0.0 else status
 
     return Flight(

@@ -26,7 +26,19 @@ def landing_pose(stance, sin_a, cos_a, sin_twist, cos_twist):
 
 
 @inlined
-def landing_place(stance, pitch, sin_a, cos_a, sin_twist, cos_twist, new_pitch, new_sin_a, new_cos_a, sin_heading, cos_heading):
+def landing_place(
+    stance,
+    pitch,
+    sin_a,
+    cos_a,
+    sin_twist,
+    cos_twist,
+    new_pitch,
+    new_sin_a,
+    new_cos_a,
+    sin_heading,
+    cos_heading,
+):
     """From the old contact reference point to the new one, along the old heading and to its right."""
     sin_pitch = sin_a * stance.cos_tilt - cos_a * stance.sin_tilt
     arm = 2.0 * stance.half_axle
@@ -68,8 +80,12 @@ def impact(
     n3 = -sin_twist * twist_rate
     before = 0.5 * (v1 * v1 + va * va + v3 * v3 + h2 * (n1 * n1 + na * na + n3 * n3))
 
-    v1, va, v3 = _to_new_foot(stance, v1, va, v3, sin_twist, cos_twist, new_sin_twist, new_cos_twist)
-    n1, na, n3 = _to_new_foot(stance, n1, na, n3, sin_twist, cos_twist, new_sin_twist, new_cos_twist)
+    v1, va, v3 = _to_new_foot(
+        stance, v1, va, v3, sin_twist, cos_twist, new_sin_twist, new_cos_twist
+    )
+    n1, na, n3 = _to_new_foot(
+        stance, n1, na, n3, sin_twist, cos_twist, new_sin_twist, new_cos_twist
+    )
 
     new_z = offset - stance.half_axle
     new_q = stance.sin_tilt * new_cos_twist + new_z * new_sin_twist

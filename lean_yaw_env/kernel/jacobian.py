@@ -17,7 +17,9 @@ INPUTS = 8
 
 
 @entry_point()
-def step_jacobian(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side, state, jacobian):
+def step_jacobian(
+    body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side, state, jacobian
+):
     """Write the next section state (5,) and its derivatives (5, 8) by state and command; return how the step ended."""
     status = 0.0
     for column in range(INPUTS):

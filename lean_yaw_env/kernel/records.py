@@ -65,6 +65,8 @@ class Stance(NamedTuple):
     offset_before: float
     offset_change: float
     shift_rate: float  # one over the shift's duration
+    friction_limit_squared: float
+    max_duration: float
 
 
 class Flight(NamedTuple):

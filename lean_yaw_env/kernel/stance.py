@@ -85,15 +85,26 @@ def velocity_products(
 
 
 @inlined
-def accelerations(stance, time, pitch, twist, pitch_rate, twist_rate):
-    """Angular accelerations of pitch and twist: D'Alembert's principle along both degrees of freedom."""
+def _balance(stance, time, pitch, twist, pitch_rate, twist_rate):
+    """Solve D'Alembert's principle along both degrees of freedom for the angular accelerations.
+
+    Also returned: what the contact force needs, which is gravity less velocity products along e1, a and e3, and the levers.
+    """
     sin_a, cos_a = sine_cosine(pitch + stance.tilt)
     sin_twist, cos_twist = sine_cosine(twist)
     offset, offset_rate, offset_acceleration = mass_offset(stance, time)
     z, q, dq = middle_of_masses(stance, sin_twist, cos_twist, offset)
     u, w, m11, m12, m22 = mass_matrix(stance, sin_a, cos_a, sin_twist, z, q, dq)
     b1, ba, b3 = velocity_products(
-        stance, sin_twist, cos_twist, q, dq, pitch_rate, twist_rate, offset_rate, offset_acceleration
+        stance,
+        sin_twist,
+        cos_twist,
+        q,
+        dq,
+        pitch_rate,
+        twist_rate,
+        offset_rate,
+        offset_acceleration,
     )
     along_e1 = stance.gravity_x * cos_a + stance.gravity_y * sin_a - b1
     along_a = stance.gravity_x * sin_a - stance.gravity_y * cos_a - ba
@@ -108,30 +119,38 @@ def accelerations(stance, time, pitch, twist, pitch_rate, twist_rate):
         - stance.ankle_damping * twist_rate
     )
     inverse = 1.0 / (m11 * m22 - m12 * m12)
-    return (m22 * f1 - m12 * f2) * inverse, (m11 * f2 - m12 * f1) * inverse
+    pitch_acceleration = (m22 * f1 - m12 * f2) * inverse
+    twist_acceleration = (m11 * f2 - m12 * f1) * inverse
+    return (
+        pitch_acceleration, twist_acceleration,
+        sin_a, cos_a, u, w, q, dq, along_e1, along_a, along_e3,
+    )  # fmt: skip
 
 
 @inlined
-def contact_force(
-    stance, time, pitch, twist, pitch_rate, twist_rate, pitch_acceleration, twist_acceleration
-):
-    """Normal force and the squared ratio of tangential to normal force, from the masses' acceleration."""
-    sin_a, cos_a = sine_cosine(pitch + stance.tilt)
-    sin_twist, cos_twist = sine_cosine(twist)
-    offset, offset_rate, offset_acceleration = mass_offset(stance, time)
-    z, q, dq = middle_of_masses(stance, sin_twist, cos_twist, offset)
-    u, w, m11, m12, m22 = mass_matrix(stance, sin_a, cos_a, sin_twist, z, q, dq)
-    b1, ba, b3 = velocity_products(
-        stance, sin_twist, cos_twist, q, dq, pitch_rate, twist_rate, offset_rate, offset_acceleration
+def accelerations(stance, time, pitch, twist, pitch_rate, twist_rate):
+    """Angular accelerations of pitch and twist."""
+    balance = _balance(stance, time, pitch, twist, pitch_rate, twist_rate)
+    return balance[0], balance[1]
+
+
+@inlined
+def floor_force(stance, time, pitch, twist, pitch_rate, twist_rate):
+    """Angular accelerations, and the floor's force on the foot: ahead, up (normal) and to the right."""
+    dw, dv, sin_a, cos_a, u, w, q, dq, along_e1, along_a, along_e3 = _balance(
+        stance, time, pitch, twist, pitch_rate, twist_rate
     )
-    f1 = b1 - stance.gravity_x * cos_a - stance.gravity_y * sin_a
-    fa = ba - stance.gravity_x * sin_a + stance.gravity_y * cos_a
-    f1 = f1 - u * pitch_acceleration + dq * twist_acceleration
-    fa = fa - w * pitch_acceleration
-    f3 = b3 - stance.gravity_z - q * twist_acceleration
-    normal = sin_a * f1 - cos_a * fa
-    forward = cos_a * f1 + sin_a * fa
-    return normal, (forward * forward + f3 * f3) / (normal * normal)
+    f1 = dq * dv - u * dw - along_e1
+    fa = -w * dw - along_a
+    f3 = -q * dv - along_e3
+    return dw, dv, cos_a * f1 + sin_a * fa, sin_a * f1 - cos_a * fa, f3
+
+
+@inlined
+def accelerations_and_contact(stance, time, pitch, twist, pitch_rate, twist_rate):
+    """Angular accelerations, normal force, and the squared ratio of tangential to normal force."""
+    dw, dv, ahead, normal, aside = floor_force(stance, time, pitch, twist, pitch_rate, twist_rate)
+    return dw, dv, normal, (ahead * ahead + aside * aside) / (normal * normal)
 
 
 @inlined

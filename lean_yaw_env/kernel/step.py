@@ -32,7 +32,7 @@ from lean_yaw_env.kernel.records import (
 )
 from lean_yaw_env.kernel.stance import (
     accelerations,
-    contact_force,
+    accelerations_and_contact,
     kinetic_energy,
     mass_matrix,
     mass_offset,
@@ -70,6 +70,8 @@ def stance_of(body, command, heading, side):
         command.offset_before,
         command.offset - command.offset_before,
         1.0 / body.shift_time,
+        body.friction_limit * body.friction_limit,
+        body.max_step_duration,
     )
 
 
@@ -79,8 +81,9 @@ def start(stance, body, pitch, twist, pitch_rate, twist_rate):
     sin_a, cos_a = sine_cosine(pitch + stance.tilt)
     sin_twist, cos_twist = sine_cosine(twist)
     time = 0.0 * pitch
-    dw, dv = accelerations(stance, time, pitch, twist, pitch_rate, twist_rate)
-    normal, friction = contact_force(stance, time, pitch, twist, pitch_rate, twist_rate, dw, dv)
+    dw, dv, normal, friction = accelerations_and_contact(
+        stance, time, pitch, twist, pitch_rate, twist_rate
+    )
     gap, gap_rate, gap_acceleration, upright = foot_gap(
         stance, sin_a, cos_a, sin_twist, cos_twist, pitch_rate, twist_rate, dw, dv
     )
@@ -97,7 +100,7 @@ def start(stance, body, pitch, twist, pitch_rate, twist_rate):
     status = TRIP if buried else status
     status = LANDING if strikes else status
     status = SIDEWAYS if (cos_twist.real <= 0.0) | (upright.real <= 0.0) else status
-    status = SLIP if friction.real > body.friction_limit.real * body.friction_limit.real else status
+    status = SLIP if friction.real > stance.friction_limit_squared.real else status
     status = LIFT_OFF if normal.real <= 0.0 else status
     return Flight(
         time, pitch, twist, pitch_rate, twist_rate, dw, dv, gap, gap_rate, gap_acceleration,
@@ -163,7 +166,7 @@ def touch_down(stance, flight):
 
 
 @inlined
-def finish(stance, body, command, heading, side, flight):
+def finish(stance, heading, flight):
     """The outcome of a flight that has ended: the heel strike of one that lands, the last state of one that fell."""
     landing = flight.status == LANDING
     # An immediate strike has no gap to close: the foot is in the floor already
@@ -184,7 +187,17 @@ def finish(stance, body, command, heading, side, flight):
         landing_pose(stance, sin_a, cos_a, sin_twist, cos_twist)
     )
     ahead, aside = landing_place(
-        stance, x, sin_a, cos_a, sin_twist, cos_twist, new_x, new_sin_a, new_cos_a, sin_turn, cos_turn
+        stance,
+        x,
+        sin_a,
+        cos_a,
+        sin_twist,
+        cos_twist,
+        new_x,
+        new_sin_a,
+        new_cos_a,
+        sin_turn,
+        cos_turn,
     )
     new_w, new_v, before, after = impact(
         stance, sin_a, cos_a, sin_twist, cos_twist, w, v, offset, offset_rate,
@@ -244,8 +257,8 @@ def walking_step(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, s
     stance = stance_of(body, command, heading, side)
     flight = start(stance, body, pitch, -ankle, pitch_rate, -ankle_rate)
     while flight.status == FLYING:
-        flight = advance(stance, body, flight)
-    return finish(stance, body, command, heading, side, flight)
+        flight = advance(stance, flight)
+    return finish(stance, heading, flight)
 
 
 @entry_point()

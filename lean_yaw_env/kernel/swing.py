@@ -16,9 +16,7 @@ _LEAST_SQUARE = 1e-12
 @inlined
 def swing_axis(stance, sin_a, cos_a, sin_twist, cos_twist):
     """Height components Y (ankle axis), E (the leg's e1) and S of the swing leg."""
-    y = (
-        stance.sin_inter_leg * cos_twist * sin_a - stance.cos_inter_leg * cos_a
-    )
+    y = stance.sin_inter_leg * cos_twist * sin_a - stance.cos_inter_leg * cos_a
     e = stance.cos_inter_leg * cos_twist * sin_a + stance.sin_inter_leg * cos_a
     n = sin_twist * sin_a
     square = e * e + n * n

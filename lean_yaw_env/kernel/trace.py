@@ -9,13 +9,12 @@ from lean_yaw_env.kernel.elementary import sine_cosine
 from lean_yaw_env.kernel.flight import shift_end_of, stance_step
 from lean_yaw_env.kernel.stance import (
     accelerations,
-    contact_force,
+    floor_force,
     kinetic_energy,
     mass_matrix,
     mass_offset,
     middle_of_masses,
     middle_position,
-    velocity_products,
 )
 from lean_yaw_env.kernel.step import stance_of
 
@@ -41,27 +40,19 @@ COLUMNS = (
 
 
 @inlined
-def _yaw_torque(c, t, x, b, w, v, dw, dv):
-    """Torque of the floor on the foot about the normal through the contact point: the masses' moment of momentum, changing."""
+def _yaw_torque(c, t, x, b, w, v, dw, dv, ahead, aside):
+    """Torque of the floor on the foot about the normal through the contact: the masses' changing moment of momentum."""
     sin_a, cos_a = sine_cosine(x + c.tilt)
     sin_b, cos_b = sine_cosine(b)
-    offset, offset_rate, offset_acceleration = mass_offset(c, t)
-    z, q, dq = middle_of_masses(c, sin_b, cos_b, offset)
-    u, lever, m11, m12, m22 = mass_matrix(c, sin_a, cos_a, sin_b, z, q, dq)
-    b1, ba, b3 = velocity_products(c, sin_b, cos_b, q, dq, w, v, offset_rate, offset_acceleration)
-    f1 = b1 - u * dw + dq * dv - c.gravity_x * cos_a - c.gravity_y * sin_a
-    fa = ba - lever * dw - c.gravity_x * sin_a + c.gravity_y * cos_a
-    fz = b3 - q * dv - c.gravity_z
-    fx = cos_a * f1 + sin_a * fa
-    px, py, pz = middle_position(c, x, sin_a, cos_a, q, dq)
+    _, q, dq = middle_of_masses(c, sin_b, cos_b, mass_offset(c, t)[0])
+    px, _, pz = middle_position(c, x, sin_a, cos_a, q, dq)
     px = px + c.radius * x  # from where the foot touches now
-    # the axle's direction and its acceleration in the stance frame
-    nx, nz = sin_b * cos_a, cos_b
+    # the axle's direction and its acceleration
     a1 = cos_b * dv - sin_b * (w * w + v * v)
     aa = -sin_b * dw - 2.0 * cos_b * w * v
     az = -sin_b * dv - cos_b * v * v
     ax = cos_a * a1 + sin_a * aa
-    return pz * fx - px * fz + c.axle_inertia * (nz * ax - nx * az)
+    return pz * ahead - px * aside + c.axle_inertia * (cos_b * ax - sin_b * cos_a * az)
 
 
 @entry_point()
@@ -79,8 +70,7 @@ def trace(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side, du
             dw, dv = accelerations(c, t, x, b, w, v)
             x, b, w, v, _, _, _, _ = stance_step(c, t, x, b, w, v, dw, dv, h)
             t = t + h
-        dw, dv = accelerations(c, t, x, b, w, v)
-        normal, friction = contact_force(c, t, x, b, w, v, dw, dv)
+        dw, dv, ahead, normal, aside = floor_force(c, t, x, b, w, v)
         sin_a, cos_a = sine_cosine(x + c.tilt)
         sin_b, cos_b = sine_cosine(b)
         offset, offset_rate, _ = mass_offset(c, t)
@@ -99,6 +89,6 @@ def trace(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side, du
         rows[i, 7] = py
         rows[i, 8] = pz
         rows[i, 9] = normal
-        rows[i, 10] = np.sqrt(friction)
-        rows[i, 11] = _yaw_torque(c, t, x, b, w, v, dw, dv)
+        rows[i, 10] = np.sqrt(ahead * ahead + aside * aside) / normal
+        rows[i, 11] = _yaw_torque(c, t, x, b, w, v, dw, dv, ahead, aside)
         rows[i, 12] = energy - c.gravity_x * px - c.gravity_y * py - c.gravity_z * pz
