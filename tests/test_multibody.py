@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -36,7 +36,7 @@ TABLE_1 = {"hip_width": 0.3, "foot_radius": 0.5, "ankle_tilt": 0.55, "slope": 0.
 TABLE_2 = (0.001539, 0.155354, -0.004109, -0.415110, -0.070156)
 """The paper's Table 2 with more digits, the fixed point for left stance at foot mass zero.
 
-The second entry is the leg's pitch u4, 4e-6 less than the foot's pitch; the fourth is the rate of the
+The second entry is the leg's pitch u4, 4e-6 less than the foot's; the fourth is the rate of the
 foot's pitch (that of u4 is -0.415252).
 """
 UNEVEN = (0.2, 0.17, -0.02, -0.45, -0.03)
@@ -451,6 +451,19 @@ def test_the_massless_limit_is_the_compiled_walkers_step(
     limit = massless([np.array([*s.state, s.duration, *s.displacement]) for s in steps])
     expected = [*compiled.state, compiled.duration, *compiled.displacement]
     # Third-order remainder far under round-off; both integrators' 1e-10, times the weights' 5.
+    np.testing.assert_allclose(limit, expected, atol=1e-9)
+
+
+def test_the_massless_limit_of_a_heel_strike_in_mid_shift_is_the_compiled_walkers() -> None:
+    shift: dict[str, Any] = {"previous_offset": -0.02, "mass_offset": 0.02}
+    steps = [
+        MultibodyWalker(**TABLE_1, foot_mass=mass, shift_time=1.4).step(TABLE_2, **shift)
+        for mass in (4e-5, 2e-5, 1e-5)
+    ]
+    compiled = Walker(replace(compiled_parameters(), shift_time=1.4)).step(TABLE_2, **shift)
+    limit = massless([np.array([*s.state, s.duration, s.mass_offset]) for s in steps])
+    # As above.
+    expected = [*compiled.state, compiled.duration, compiled.mass_offset]
     np.testing.assert_allclose(limit, expected, atol=1e-9)
 
 
