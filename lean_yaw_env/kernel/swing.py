@@ -25,22 +25,13 @@ def swing_axis(stance, sin_a, cos_a, sin_twist, cos_twist):
 
 
 @inlined
-def foot_gap(
-    stance,
-    sin_a,
-    cos_a,
-    sin_twist,
-    cos_twist,
-    pitch_rate,
-    twist_rate,
-    pitch_acceleration,
-    twist_acceleration,
-):
-    """Height of the swing foot above touching the floor, its rate and its acceleration, and E of ``swing_axis``."""
+def axis_motion(
+    stance, sin_a, cos_a, sin_twist, cos_twist, pitch_rate, twist_rate,
+    pitch_acceleration, twist_acceleration, y, e,
+):  # fmt: skip
+    """First and second time derivatives of Y and E of ``swing_axis`` at a fixed inter-leg angle."""
     sin_d = stance.sin_inter_leg
     cos_d = stance.cos_inter_leg
-    arm = 2.0 * stance.half_axle
-    y, e, s = swing_axis(stance, sin_a, cos_a, sin_twist, cos_twist)
 
     # partial derivatives by A (= pitch) and b (twist)
     y_a = cos_d * sin_a + sin_d * cos_twist * cos_a
@@ -51,9 +42,6 @@ def foot_gap(
     e_b = -cos_d * sin_twist * sin_a
     e_ab = -cos_d * sin_twist * cos_a
     e_bb = -cos_d * cos_twist * sin_a
-    k = stance.sin_tilt * (cos_twist - stance.radius) + arm * sin_twist
-    k_b = arm * cos_twist - stance.sin_tilt * sin_twist
-    k_bb = -stance.sin_tilt * cos_twist - arm * sin_twist
 
     pp = pitch_rate * pitch_rate
     pt = 2.0 * pitch_rate * twist_rate
@@ -66,6 +54,23 @@ def foot_gap(
     e_acceleration = (
         -e * pp + e_ab * pt + e_bb * tt + e_a * pitch_acceleration + e_b * twist_acceleration
     )
+    return y_rate, y_acceleration, e_rate, e_acceleration
+
+
+@inlined
+def gap_motion(
+    stance, sin_a, cos_a, sin_twist, cos_twist, pitch_rate, twist_rate,
+    pitch_acceleration, twist_acceleration,
+    y, e, s, y_rate, y_acceleration, e_rate, e_acceleration,
+):  # fmt: skip
+    """Height of the swing foot above touching the floor, its rate and its acceleration, from Y, E, S and their motion."""
+    arm = 2.0 * stance.half_axle
+    k = stance.sin_tilt * (cos_twist - stance.radius) + arm * sin_twist
+    k_b = arm * cos_twist - stance.sin_tilt * sin_twist
+    k_bb = -stance.sin_tilt * cos_twist - arm * sin_twist
+
+    pp = pitch_rate * pitch_rate
+    tt = twist_rate * twist_rate
     s_rate = -y * y_rate / s
     s_acceleration = -(y_rate * y_rate + y * y_acceleration + s_rate * s_rate) / s
     k_rate = k_b * twist_rate
@@ -89,4 +94,30 @@ def foot_gap(
         - stance.sin_tilt * e_acceleration
         + roll * s_acceleration
     )
+    return gap, gap_rate, gap_acceleration
+
+
+@inlined
+def foot_gap(
+    stance,
+    sin_a,
+    cos_a,
+    sin_twist,
+    cos_twist,
+    pitch_rate,
+    twist_rate,
+    pitch_acceleration,
+    twist_acceleration,
+):
+    """Height of the held swing foot above touching the floor, its rate and its acceleration, and E of ``swing_axis``."""
+    y, e, s = swing_axis(stance, sin_a, cos_a, sin_twist, cos_twist)
+    y_rate, y_acceleration, e_rate, e_acceleration = axis_motion(
+        stance, sin_a, cos_a, sin_twist, cos_twist, pitch_rate, twist_rate,
+        pitch_acceleration, twist_acceleration, y, e,
+    )  # fmt: skip
+    gap, gap_rate, gap_acceleration = gap_motion(
+        stance, sin_a, cos_a, sin_twist, cos_twist, pitch_rate, twist_rate,
+        pitch_acceleration, twist_acceleration,
+        y, e, s, y_rate, y_acceleration, e_rate, e_acceleration,
+    )  # fmt: skip
     return gap, gap_rate, gap_acceleration, e
