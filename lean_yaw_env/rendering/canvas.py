@@ -1,0 +1,170 @@
+"""A smooth drawing surface: pygame's primitives at twice the size, averaged down. It needs no display."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import numpy as np
+
+from lean_yaw_env.parameters import Vector
+from lean_yaw_env.rendering.camera import Panel
+from lean_yaw_env.rendering.optional import require_pygame
+from lean_yaw_env.rendering.palette import Colour
+
+OVERSAMPLING = 2
+"""Edges are drawn on a grid this much finer, and averaged."""
+TEXT_SIZE = 12.0
+"""Of ordinary words, pixels."""
+
+
+class Canvas:
+    """Draws in picture coordinates: floats, in pixels, from the upper left corner.
+
+    Parameters
+    ----------
+    width, height : int
+        Of the finished picture, pixels.
+    background : Colour
+    """
+
+    def __init__(self, width: int, height: int, background: Colour) -> None:
+        self._pygame = require_pygame()
+        self._size = (width, height)
+        self._freetype = importlib.import_module("pygame.freetype")
+        # a depth of its own, not a display's: the same pixels with and without a window
+        fine = (OVERSAMPLING * width, OVERSAMPLING * height)
+        self._surface = self._pygame.Surface(fine, 0, 32)
+        self._background = background
+        self.clear()
+
+    def clear(self) -> None:
+        """Start a picture."""
+        self._surface.fill(self._background)
+        # anew for each picture, for another user of pygame may have quit it meanwhile; pygame's own, so that every machine draws the same letters
+        self._freetype.init()
+        self._font = self._freetype.Font(None, OVERSAMPLING * TEXT_SIZE)
+        self._font.origin = True
+
+    def surface(self) -> Any:
+        """The finished picture as a ``pygame.Surface``."""
+        return self._pygame.transform.smoothscale(self._surface, self._size)
+
+    def array(self) -> np.ndarray:
+        """The finished picture; shape (height, width, 3), uint8."""
+        width, height = self._size
+        pixels = self._pygame.image.tobytes(self.surface(), "RGB")
+        return np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, 3).copy()
+
+    def clip(self, panel: Panel | None) -> None:
+        """Keep what follows within a panel; None ends that."""
+        rectangle = None if panel is None else [round(OVERSAMPLING * value) for value in panel]
+        self._surface.set_clip(rectangle)
+
+    def rectangle(self, panel: Panel, colour: Colour, corner: float = 0.0) -> None:
+        self._pygame.draw.rect(
+            self._surface,
+            colour,
+            [round(OVERSAMPLING * value) for value in panel],
+            border_radius=round(OVERSAMPLING * corner),
+        )
+
+    def polygon(
+        self, points: Vector, fill: Colour | None, edge: Colour | None = None, width: float = 1.0
+    ) -> None:
+        """A polygon; shape (n, 2), n >= 3."""
+        corners = _fine(points)
+        if fill is not None:
+            self._pygame.draw.polygon(self._surface, fill, corners)
+        if edge is not None:
+            thickness = max(1, round(OVERSAMPLING * width))
+            self._pygame.draw.lines(self._surface, edge, True, corners, thickness)
+
+    def lines(self, points: Vector, colour: Colour, width: float = 1.0) -> None:
+        """A thin line through points; shape (n, 2)."""
+        if len(points) >= 2:
+            thickness = max(1, round(OVERSAMPLING * width))
+            self._pygame.draw.lines(self._surface, colour, False, _fine(points), thickness)
+
+    def bar(self, start: Vector, end: Vector, colour: Colour, width: float) -> None:
+        """A straight bar with round ends, of any direction and any width."""
+        along = end - start
+        length = float(np.linalg.norm(along))
+        if length > 0.0:
+            aside = 0.5 * width / length * np.array([-along[1], along[0]])
+            self.polygon(np.array([start + aside, end + aside, end - aside, start - aside]), colour)
+        if width >= 1.5:
+            self.disc(start, 0.5 * width, colour)
+            self.disc(end, 0.5 * width, colour)
+
+    def dashes(
+        self, start: Vector, end: Vector, colour: Colour, width: float, dash: float = 5.0
+    ) -> None:
+        """A straight dashed line; equal dashes and gaps, a dash at each end."""
+        count = max(1, 2 * round(0.5 * (np.linalg.norm(end - start) / dash - 1.0)) + 1)
+        for i in range(0, count, 2):
+            self.bar(
+                start + (end - start) * i / count, start + (end - start) * (i + 1) / count, colour, width
+            )
+
+    def disc(self, centre: Vector, radius: float, colour: Colour) -> None:
+        self._pygame.draw.circle(self._surface, colour, _fine(centre), OVERSAMPLING * radius)
+
+    def ring(self, centre: Vector, radius: float, colour: Colour, width: float = 1.0) -> None:
+        self._pygame.draw.circle(
+            self._surface,
+            colour,
+            _fine(centre),
+            OVERSAMPLING * radius,
+            max(1, round(OVERSAMPLING * width)),
+        )
+
+    def arrow(self, start: Vector, end: Vector, colour: Colour, width: float) -> None:
+        """An arrow with its tip at ``end``."""
+        along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
+        aside = np.array([-along[1], along[0]])
+        neck = end - 4.5 * width * along
+        self.bar(start, neck, colour, width)
+        barb = end - 5.0 * width * along
+        self.polygon(
+            np.array([end, barb + 2.2 * width * aside, neck, barb - 2.2 * width * aside]), colour
+        )
+
+    def text(
+        self,
+        words: str,
+        place: tuple[float, float],
+        colour: Colour,
+        size: float = TEXT_SIZE,
+        anchor: tuple[float, float] = (0.0, 0.0),
+        ground: Colour | None = None,
+    ) -> float:
+        """Write one line, and return its width in pixels.
+
+        Parameters
+        ----------
+        place, anchor : (float, float)
+            ``anchor`` says which point of the line's box comes to ``place``: (0, 0) the upper left, (1, 1) the lower right.
+        size : float
+            Height of the letters' box, pixels.
+        ground : Colour, optional
+            Of a patch behind the words, to keep them readable over a drawing.
+        """
+        fine = OVERSAMPLING * size
+        width = self._font.get_rect(words, size=fine).width
+        height = 0.75 * fine  # of capitals: lines of one size share their baseline, whichever letters they have
+        left = OVERSAMPLING * place[0] - anchor[0] * width
+        top = OVERSAMPLING * place[1] - anchor[1] * height
+        if ground is not None:
+            margin = 0.35 * fine
+            patch = [left - margin, top - margin, width + 2.0 * margin, height + 2.0 * margin]
+            self._pygame.draw.rect(
+                self._surface, ground, [round(v) for v in patch], border_radius=round(margin)
+            )
+        baseline = (round(left), round(top + height))
+        self._font.render_to(self._surface, baseline, words, colour, size=fine)
+        return width / OVERSAMPLING
+
+
+def _fine(points: Vector) -> list[Any]:
+    return (OVERSAMPLING * points).tolist()

@@ -1,0 +1,292 @@
+"""One labelled drawing of the walker with its parameters and coordinates, after the paper's Figure 5."""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lean_yaw_env.parameters import Foot, Vector, WalkerParameters
+from lean_yaw_env.rendering.camera import upward
+from lean_yaw_env.rendering.files import require_ending, written_whole
+from lean_yaw_env.rendering.footprints import footprint_length, footprint_outlines
+from lean_yaw_env.rendering.geometry import LegShape, Pose, WalkerShape, walker_shape
+from lean_yaw_env.rendering.palette import (
+    ANKLE_AXIS,
+    COMMAND,
+    FAINT_INK,
+    FOOT_COLOURS,
+    GROUND,
+    INK,
+    Colour,
+    mixed,
+    unit_colour,
+)
+from lean_yaw_env.rendering.picture import ENDINGS, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# A pose in which everything can be seen; no gait leans or turns so far.
+_HEADING, _STANCE_PITCH, _INTER_LEG_ANGLE, _LEAN, _MASS_OFFSET = 0.35, 0.2, 0.5, 0.3, 0.09
+_LEAST_SLOPE = 0.09  # a gait's own slope would look level
+_DPI = 150
+_AXIS_ABOVE, _AXIS_BELOW = 0.42, 0.14
+_RIGHT, _UP = np.array([1.0, 0.0]), np.array([0.0, 1.0])
+
+
+def draw_walker(parameters: WalkerParameters, path: str | os.PathLike[str]) -> None:
+    """Draw the walker from the side, from behind and from above, with its parameters' names, to a .png, .svg or .pdf.
+
+    The proportions are the parameters'; the pose, and a slope too slight to be seen, are exaggerated, and the picture says so.
+
+    Raises
+    ------
+    ValueError
+        If the path has another ending.
+    gymnasium.error.DependencyNotInstalled
+        If matplotlib is not installed.
+    """
+    place = require_ending(path, ENDINGS)
+    figure = new_figure(12.0, 5.0)
+    side, rear, top = figure.subplots(1, 3, width_ratios=(1.25, 1.0, 1.0))
+    _draw_side(side, parameters)
+    _draw_rear(rear, parameters)
+    _draw_top(top, parameters)
+    for axes, title in ((side, "from the side"), (rear, "from behind"), (top, "from above")):
+        axes.set_title(title, color=unit_colour(FAINT_INK), fontsize=11)
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+    figure.supxlabel(_caption(parameters), fontsize=10, color=unit_colour(INK))
+    with written_whole(place) as temporary:
+        figure.savefig(temporary, dpi=_DPI)
+
+
+def _caption(parameters: WalkerParameters) -> str:
+    values = (
+        rf"hip width $d$ = {parameters.hip_width:g}     foot radius $r$ = {parameters.foot_radius:g}     "
+        rf"ankle tilt $\alpha$ = {parameters.ankle_tilt:g} rad     slope $\gamma$ = {parameters.slope:g} rad"
+    )
+    return (
+        values + "\n" + r"stance pitch $\theta$, ankle angle $u$, heading $\varphi$, "
+        r"inter-leg angle $\Delta$ and mass offset $\mu$, like the slope, drawn large to be seen; leg length 1"
+    )
+
+
+class _View:
+    """Points of space on the page: rightward and upward unit vectors of the floor frame."""
+
+    def __init__(self, right: Vector, up: Vector) -> None:
+        self._axes = np.column_stack([right, up])
+
+    def __call__(self, points: Vector) -> Vector:
+        return points @ self._axes
+
+
+def _draw_side(axes: Axes, parameters: WalkerParameters) -> None:
+    slope = parameters.slope
+    if slope != 0.0:
+        slope = math.copysign(max(abs(slope), _LEAST_SLOPE), slope)
+    pose = Pose(np.array([0.0, _STANCE_PITCH, 0.0, 0.0, 0.0]), "right", _INTER_LEG_ANGLE)
+    shape = walker_shape(parameters, pose)
+    up = upward(replace(parameters, slope=slope, slope_turns=False), 0.0)
+    view = _View(np.cross(up, np.array([0.0, 0.0, 1.0])), up)
+    downhill, normal = view(np.array([1.0, 0.0, 0.0])), view(np.array([0.0, 1.0, 0.0]))
+    contact = view(shape.contact)
+    _draw_floor(axes, contact, downhill, 0.75, 1.15)
+    _draw_leg(axes, view, shape.swing_leg, 0.5)
+    _draw_leg(axes, view, shape.stance_leg, 0.0)
+    hip = view(shape.stance_leg.hip)
+    _draw_mass(axes, hip)
+    if slope != 0.0:
+        start = contact - 0.7 * downhill if slope > 0.0 else contact + 1.1 * downhill
+        ahead = _RIGHT if slope > 0.0 else -_RIGHT
+        along = downhill if slope > 0.0 else -downhill
+        _line(axes, start, start + 0.6 * ahead, FAINT_INK, 0.8, "--")
+        _draw_angle(axes, start, ahead, along, 0.5, r"$\gamma$")
+    ankle = view(shape.stance_leg.ankle)
+    _line(axes, ankle, ankle + 0.72 * normal, FAINT_INK, 0.8, "--")
+    _draw_angle(axes, ankle, normal, hip - ankle, 0.62, r"$\theta$")
+    axis = view(shape.stance_leg.ankle_axis)
+    _draw_angle(axes, ankle, hip - ankle, -axis, 0.36, r"$\alpha$", ANKLE_AXIS)
+    _draw_angle(axes, hip, ankle - hip, view(shape.swing_leg.ankle) - hip, 0.45, r"$\Delta$")
+    _draw_radius(axes, view, shape, parameters.foot_radius)
+    _draw_gravity(axes, np.array([hip[0] + 0.55, hip[1] - 0.05]))
+    _label(axes, 0.5 * (hip + ankle), "1", (-9, 0))
+
+
+def _draw_radius(axes: Axes, view: _View, shape: WalkerShape, radius: float) -> None:
+    if radius == 0.0:
+        return
+    leg = shape.swing_leg
+    centre = view(leg.centre)
+    toe = view(0.5 * (leg.inner_arc + leg.outer_arc)[-1])
+    _line(axes, centre, toe, INK, 0.9)
+    axes.plot(*centre, marker="+", color=unit_colour(INK), markersize=6)
+    _label(axes, 0.5 * (centre + toe), "$r$", (8, 2))
+
+
+def _draw_rear(axes: Axes, parameters: WalkerParameters) -> None:
+    pose = Pose(
+        np.array([0.0, 0.0, -_LEAN, 0.0, 0.0]), "right", 0.25, mass_offset=_MASS_OFFSET
+    )
+    shape = walker_shape(parameters, pose)
+    view = _View(np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]))
+    contact = view(shape.contact)
+    _draw_floor(axes, contact, _RIGHT, 0.45 + parameters.hip_width, 0.45)
+    _draw_leg(axes, view, shape.swing_leg, 0.5)
+    _draw_leg(axes, view, shape.stance_leg, 0.0)
+    hips = view(np.array([shape.swing_leg.hip, shape.stance_leg.hip]))
+    masses = view(shape.masses)
+    along = view(shape.axle)
+    _line(axes, hips[0], masses[1], mixed(INK, (255, 255, 255), 0.3), 2.5)
+    for mass in masses:
+        _draw_mass(axes, mass)
+    across = np.array([-along[1], along[0]])
+    if parameters.hip_width > 0.0:
+        _draw_span(axes, hips[0] + 0.2 * across, hips[1] + 0.2 * across, "$d$")
+    _draw_span(axes, hips[1] + 0.09 * across, masses[1] + 0.09 * across, r"$\mu$")
+    ankle = view(shape.stance_leg.ankle)
+    _line(axes, ankle, ankle + 0.8 * _UP, FAINT_INK, 0.8, "--")
+    _draw_angle(axes, ankle, _UP, hips[1] - ankle, 0.7, "lean")
+    above = view(shape.stance_leg.ankle - _AXIS_ABOVE * shape.stance_leg.ankle_axis)
+    _draw_turn(axes, above, ankle - above)
+
+
+def _draw_top(axes: Axes, parameters: WalkerParameters) -> None:
+    stance: Foot = "right"
+    pose = Pose(np.array([_HEADING, 0.1, 0.0, 0.0, 0.0]), stance, 0.3)
+    shape = walker_shape(parameters, pose)
+    length = footprint_length(parameters.foot_radius)
+    foot = np.zeros(2)
+    view = _View(np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
+    swing = view(shape.swing_leg.ankle)
+    for leg, place, alpha in ((shape.stance_leg, foot, 1.0), (shape.swing_leg, swing[::-1], 0.4)):
+        outline = footprint_outlines(place[None], np.array([_HEADING]), [leg.foot], length)[0]
+        axes.fill(
+            outline[:, 1], outline[:, 0], color=unit_colour(FOOT_COLOURS[leg.foot]), alpha=alpha, lw=0
+        )
+    hips = view(np.array([shape.stance_leg.hip, shape.swing_leg.hip]))
+    _line(axes, hips[0], hips[1], mixed(INK, (255, 255, 255), 0.3), 2.5)
+    for hip in hips:
+        _draw_mass(axes, hip)
+    heading = np.array([-math.sin(_HEADING), math.cos(_HEADING)])
+    _draw_arrow(axes, foot, 0.75 * heading, FOOT_COLOURS[stance])
+    _draw_arrow(axes, foot, 0.75 * _UP, FAINT_INK)
+    _label(axes, 0.75 * _UP, "downhill", (0, 8), FAINT_INK)
+    _label(axes, 0.75 * heading, "heading", (0, 8), FOOT_COLOURS[stance])
+    _draw_angle(axes, foot, _UP, heading, 0.6, r"$\varphi$")
+    axes.set_xlim(-0.45 - parameters.hip_width, 0.4)
+    axes.set_ylim(-0.3, 0.95)
+
+
+def _draw_floor(axes: Axes, contact: Vector, along: Vector, back: float, front: float) -> None:
+    edge = np.array([contact - back * along, contact + front * along])
+    deep = edge - 0.09 * np.array([-along[1], along[0]])
+    axes.fill(*np.vstack([edge, deep[::-1]]).T, color=unit_colour(GROUND), lw=0)
+    _line(axes, edge[0], edge[1], INK, 1.0)
+
+
+def _draw_leg(axes: Axes, view: _View, leg: LegShape, fading: float) -> None:
+    white: Colour = (255, 255, 255)
+    colour = mixed(FOOT_COLOURS[leg.foot], white, fading)
+    for arc in (leg.inner_arc, leg.outer_arc):
+        axes.fill(*view(arc).T, color=unit_colour(mixed(colour, white, 0.6)), lw=0)
+    sole = np.vstack([leg.inner_arc, leg.outer_arc[::-1]])
+    axes.fill(*view(sole).T, facecolor=unit_colour(mixed(colour, white, 0.6)), edgecolor=unit_colour(colour))
+    _line(axes, view(leg.ankle), view(leg.hip), colour, 4.5)
+    ends = view(
+        np.array([leg.ankle - _AXIS_ABOVE * leg.ankle_axis, leg.ankle + _AXIS_BELOW * leg.ankle_axis])
+    )
+    _line(axes, ends[0], ends[1], mixed(ANKLE_AXIS, white, fading), 1.3, (0, (5, 2, 1, 2)))
+
+
+def _line(axes: Axes, start: Vector, end: Vector, colour: Colour, width: float, style: object = "-") -> None:
+    axes.plot(
+        [start[0], end[0]],
+        [start[1], end[1]],
+        color=unit_colour(colour),
+        linewidth=width,
+        linestyle=style,  # pyright: ignore[reportArgumentType]
+        solid_capstyle="round",
+    )
+
+
+def _draw_mass(axes: Axes, place: Vector) -> None:
+    axes.plot(*place, marker="o", markersize=13, color=unit_colour(INK))
+
+
+def _label(
+    axes: Axes, place: Vector, words: str, shift: tuple[float, float], colour: Colour = INK
+) -> None:
+    axes.annotate(
+        words,
+        tuple(place),
+        xytext=shift,
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        color=unit_colour(colour),
+        fontsize=13 if words.startswith("$") else 10,
+    )
+
+
+def _draw_angle(
+    axes: Axes,
+    corner: Vector,
+    first: Vector,
+    second: Vector,
+    radius: float,
+    words: str,
+    colour: Colour = INK,
+) -> None:
+    """An arc from one direction to another, the short way, with its name outside."""
+    start = math.atan2(first[1], first[0])
+    turn = math.remainder(math.atan2(second[1], second[0]) - start, 2.0 * math.pi)
+    angles = start + turn * np.linspace(0.0, 1.0, 30)
+    arc = corner + radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    axes.plot(*arc.T, color=unit_colour(colour), linewidth=0.9)
+    middle = start + 0.5 * turn
+    outward = np.array([math.cos(middle), math.sin(middle)])
+    shift = 9.0 if words.startswith("$") else 12.0
+    _label(axes, corner + radius * outward, words, (shift * outward[0], shift * outward[1]), colour)
+
+
+def _draw_span(axes: Axes, start: Vector, end: Vector, words: str) -> None:
+    """A dimension line between two points, its name above."""
+    axes.annotate(
+        "",
+        tuple(start),
+        xytext=tuple(end),
+        arrowprops={"arrowstyle": "<->", "color": unit_colour(INK), "lw": 0.9, "shrinkA": 0, "shrinkB": 0},
+    )
+    _label(axes, 0.5 * (start + end), words, (0, 9))
+
+
+def _draw_arrow(axes: Axes, start: Vector, along: Vector, colour: Colour) -> None:
+    axes.annotate(
+        "",
+        tuple(start + along),
+        xytext=tuple(start),
+        arrowprops={"arrowstyle": "-|>", "color": unit_colour(colour), "lw": 1.4, "shrinkA": 0, "shrinkB": 0},
+    )
+
+
+def _draw_gravity(axes: Axes, place: Vector) -> None:
+    _draw_arrow(axes, place, -0.22 * _UP, COMMAND)
+    _label(axes, place - 0.11 * _UP, "$g$", (9, 0), COMMAND)
+
+
+def _draw_turn(axes: Axes, place: Vector, along: Vector) -> None:
+    """A curved arrow about the ankle axis, named u."""
+    angle = math.atan2(along[1], along[0])
+    s = np.linspace(-0.8 * math.pi, 0.8 * math.pi, 40)
+    local = np.column_stack([0.02 * np.cos(s), 0.06 * np.sin(s)])
+    cosine, sine = math.cos(angle), math.sin(angle)
+    ring = place + local @ np.array([[cosine, sine], [-sine, cosine]])
+    axes.plot(*ring.T, color=unit_colour(ANKLE_AXIS), linewidth=1.2)
+    _draw_arrow(axes, ring[-2], ring[-1] - ring[-2], ANKLE_AXIS)
+    _label(axes, place, "$u$", (14, 2), ANKLE_AXIS)

@@ -1,0 +1,133 @@
+"""Scenes as pictures: an array without a display, or a window."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lean_yaw_env.parameters import require_number
+from lean_yaw_env.rendering.body_views import draw_rear_view, draw_side_view
+from lean_yaw_env.rendering.camera import Panel
+from lean_yaw_env.rendering.canvas import Canvas
+from lean_yaw_env.rendering.geometry import walker_shape
+from lean_yaw_env.rendering.optional import require_pygame
+from lean_yaw_env.rendering.palette import BACKGROUND
+from lean_yaw_env.rendering.scene import Scene
+from lean_yaw_env.rendering.top_view import draw_top_view
+
+SIZE = (960, 540)
+"""Width and height of a picture, pixels."""
+LEAST_SIZE, GREATEST_SIZE = (480, 360), (3840, 2160)
+_GAP = 6.0
+_TOP_SHARE = 0.585  # of the width, for the view from above
+
+
+class Renderer:
+    """Draws scenes: from above on the left, from the side and from behind on the right.
+
+    Parameters
+    ----------
+    size : (width, height)
+        Pixels, from (480, 360) to (3840, 2160).
+
+    Raises
+    ------
+    ValueError
+        If the size is outside its range.
+    gymnasium.error.DependencyNotInstalled
+        If pygame is not installed.
+    """
+
+    def __init__(self, size: tuple[int, int] = SIZE) -> None:
+        self.size = _require_size(size)
+        self._pygame = require_pygame()
+        self._canvas = Canvas(*self.size, BACKGROUND)
+        self._window: Any = None
+        self._clock: Any = None
+        self._closed_by_user = False
+
+    def frame(self, scene: Scene) -> NDArray[np.uint8]:
+        """The picture of a scene; shape (height, width, 3), uint8. Needs no display and opens none."""
+        self._draw(scene)
+        return self._canvas.array()
+
+    def show(self, scene: Scene, fps: float = 30.0) -> bool:
+        """Show a scene in a window, waiting as long as the frame rate asks.
+
+        Returns
+        -------
+        bool
+            False once the window has been closed by its user; it stays closed, and nothing more is drawn.
+
+        Raises
+        ------
+        RuntimeError
+            If there is no display; ``frame`` needs none.
+        """
+        rate = require_number("fps", fps, 0.0, 1000.0, "(]")
+        if self._closed_by_user:
+            return False
+        if self._window is None:
+            self._open()
+        self._draw(scene)
+        self._window.blit(self._canvas.surface(), (0, 0))
+        self._pygame.display.flip()
+        self._clock.tick(rate)
+        for event in self._pygame.event.get():
+            if event.type == self._pygame.QUIT:
+                self.close()
+                self._closed_by_user = True
+                return False
+        return True
+
+    def close(self) -> None:
+        """Close the window, if there is one; a later ``show`` opens a new one."""
+        if self._window is not None:
+            self._window = None
+            self._pygame.display.quit()
+
+    def _open(self) -> None:
+        try:
+            self._pygame.display.init()
+            self._window = self._pygame.display.set_mode(self.size)
+        except self._pygame.error as error:
+            raise RuntimeError(
+                f"no window could be opened ({error}); without a display, ask for arrays instead"
+            ) from error
+        self._pygame.display.set_caption("Lean-to-yaw walker")
+        self._clock = self._pygame.time.Clock()
+
+    def _draw(self, scene: Scene) -> None:
+        top, side, rear = _panels(self.size)
+        shape = walker_shape(scene.parameters, scene.pose)
+        self._canvas.clear()
+        draw_top_view(self._canvas, top, scene, shape)
+        draw_side_view(self._canvas, side, scene, shape)
+        draw_rear_view(self._canvas, rear, scene, shape)
+
+
+def _panels(size: tuple[int, int]) -> tuple[Panel, Panel, Panel]:
+    width, height = size
+    split = round(_TOP_SHARE * width)
+    middle = round(0.5 * height)
+    rest = width - split - _GAP
+    return (
+        Panel(0.0, 0.0, split, height),
+        Panel(split + _GAP, 0.0, rest, middle - 0.5 * _GAP),
+        Panel(split + _GAP, middle + 0.5 * _GAP, rest, height - middle - 0.5 * _GAP),
+    )
+
+
+def _require_size(size: tuple[int, int]) -> tuple[int, int]:
+    try:
+        width, height = size
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"size must be (width, height) in pixels, not {size!r}") from error
+    for name, value, low, high in zip(
+        ("width", "height"), (width, height), LEAST_SIZE, GREATEST_SIZE, strict=True
+    ):
+        if int(require_number(f"size: {name}", value, low, high)) != value:
+            raise ValueError(f"size: {name} must be a whole number of pixels, not {value!r}")
+    return int(width), int(height)

@@ -1,0 +1,130 @@
+"""What a picture of a walk holds, whoever made the walk: an environment, a film, a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from lean_yaw_env.parameters import Foot, Vector, WalkerParameters, require_foot, require_number
+from lean_yaw_env.rendering.geometry import Pose, require_finite
+
+
+class Goal(NamedTuple):
+    """A place on the floor to be reached."""
+
+    downhill: float
+    right: float
+    radius: float
+    reached: bool = False
+
+
+def _no_points() -> Vector:
+    return np.empty((0, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A walker on its slope at one instant, with the walk behind it and what it is asked to do.
+
+    Parameters
+    ----------
+    parameters : WalkerParameters
+    pose : Pose
+        The walker now.
+    footprints : shape (n, 2)
+        Contact reference points so far, (downhill, right), in leg lengths; the last is the stance foot's.
+    headings : shape (n,)
+        Of each footprint, rad.
+    feet : n of "left" or "right"
+    path : shape (m, 2)
+        The centre of mass so far, (downhill, right).
+    commanded_heading : float, optional
+        rad, positive to the left.
+    goals : sequence of Goal
+    reference_path : shape (k, 2), optional
+        Line on the floor to be followed.
+    lines : sequence of str
+        A few words beside the picture; ``status_lines`` makes the usual ones.
+
+    Raises
+    ------
+    ValueError
+        If an array has another shape or holds what is not a finite number, or a foot or goal is none.
+    """
+
+    parameters: WalkerParameters
+    pose: Pose
+    footprints: Vector = field(default_factory=_no_points)
+    headings: Vector = field(default_factory=lambda: np.empty(0))
+    feet: Sequence[Foot] = ()
+    path: Vector = field(default_factory=_no_points)
+    commanded_heading: float | None = None
+    goals: Sequence[Goal] = ()
+    reference_path: Vector | None = None
+    lines: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.parameters, WalkerParameters):
+            raise ValueError(f"parameters must be WalkerParameters, not {self.parameters!r}")
+        if not isinstance(self.pose, Pose):
+            raise ValueError(f"pose must be a Pose, not {self.pose!r}")
+        footprints = require_finite("footprints", self.footprints, (None, 2))
+        headings = require_finite("headings", self.headings, (len(footprints),))
+        feet = tuple(require_foot(foot) for foot in self.feet)
+        if len(feet) != len(footprints):
+            raise ValueError(f"feet must hold {len(footprints)}, one per footprint, not {len(feet)}")
+        object.__setattr__(self, "footprints", footprints)
+        object.__setattr__(self, "headings", headings)
+        object.__setattr__(self, "feet", feet)
+        object.__setattr__(self, "path", require_finite("path", self.path, (None, 2)))
+        object.__setattr__(self, "goals", tuple(_require_goal(goal) for goal in self.goals))
+        object.__setattr__(self, "lines", tuple(str(line) for line in self.lines))
+        if self.commanded_heading is not None:
+            heading = require_number("commanded_heading", self.commanded_heading, -1e6, 1e6)
+            object.__setattr__(self, "commanded_heading", heading)
+        if self.reference_path is not None:
+            line = require_finite("reference_path", self.reference_path, (None, 2))
+            object.__setattr__(self, "reference_path", line)
+
+    @property
+    def heading(self) -> float:
+        """Mean heading of the last two footprints, for left and right alternate; the stance foot's if there are not two."""
+        if len(self.headings) < 2:
+            return float(self.pose.state[0])
+        return float(self.headings[-2:].mean())
+
+
+def status_lines(
+    *,
+    step: int,
+    time: float,
+    speed: float | None = None,
+    heading: float | None = None,
+    commanded_heading: float | None = None,
+    status: str = "walking",
+) -> tuple[str, ...]:
+    """The usual words beside the picture of a walk, the same from a film and from an environment."""
+    lines = [f"step {step}", f"time {time:.1f}"]
+    if speed is not None:
+        lines.append(f"speed {speed:.3f}")
+    if heading is not None:
+        lines.append(f"heading {heading:+.3f} rad")
+    if commanded_heading is not None:
+        lines.append(f"commanded {commanded_heading:+.3f} rad")
+    return (*lines, status)
+
+
+def _require_goal(goal: Goal) -> Goal:
+    try:
+        downhill, right, radius, reached = goal
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"a goal must be (downhill, right, radius, reached), not {goal!r}") from error
+    return Goal(
+        require_number("goal's downhill", downhill, -1e6, 1e6),
+        require_number("goal's right", right, -1e6, 1e6),
+        require_number("goal's radius", radius, 0.0, 1e6, "(]"),
+        bool(reached),
+    )
