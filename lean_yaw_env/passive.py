@@ -1,0 +1,369 @@
+"""Passive walkers A to D of the paper (Figure 6), whose swing leg is a pendulum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lean_yaw_env.kernel import records
+from lean_yaw_env.kernel.passive import PassiveOutcome, passive_batch, passive_trace
+from lean_yaw_env.parameters import (
+    MIRROR,
+    QUARTER_TURN,
+    STATE_FIELDS,
+    Foot,
+    StateField,
+    Vector,
+    WalkerParameters,
+    require_foot,
+    require_number,
+    require_state,
+)
+from lean_yaw_env.walker import OTHER_FOOT, SIDE, raise_for_failure
+
+PASSIVE_STATE_FIELDS = (
+    *STATE_FIELDS,
+    StateField("inter_leg_rate", "Delta'", "rad / time unit", "rate of the inter-leg angle"),
+)
+"""The passive walker's section state just after heel strike, in the order used everywhere.
+
+The inter-leg angle is not in it: both feet are on the floor, which determines it.
+"""
+
+PASSIVE_STATE_SIZE = len(PASSIVE_STATE_FIELDS)
+PASSIVE_MIRROR = np.append(MIRROR, 1.0)
+"""Signs that turn a passive section state of one stance foot into its mirror image."""
+PASSIVE_MIRROR.flags.writeable = False
+
+FORE_AFT = (1, 3, 5)
+"""Coordinates of a passive section state that a planar walker moves."""
+
+MOTION_COLUMNS = (
+    "time",
+    "stance_pitch",
+    "ankle_angle",
+    "inter_leg_angle",
+    "stance_pitch_rate",
+    "ankle_rate",
+    "inter_leg_rate",
+    "swing_foot_height",
+)
+"""What ``PassiveWalker.motion`` gives; the height is the swing foot's above touching the floor."""
+
+
+class PassiveFall(str, Enum):
+    """The ways a passive walker falls, each by a physical criterion; members equal their names."""
+
+    BACKWARD = "backward"
+    """The stance leg moves backward and accelerates backward: it does not pass mid-stance."""
+    FORWARD = "forward"
+    """The leg tips over forward until the floor no longer holds it, the swing foot not down."""
+    SIDEWAYS = "sideways"
+    """An ankle would turn past a right angle, or the walker comes down not moving forward."""
+    LIFT_OFF = "lift-off"
+    """The normal force vanishes before mid-stance: the walker is too fast for its weight."""
+    SLIP = "slip"
+    """The step demands more friction than ``friction_limit``."""
+    NO_HEEL_STRIKE = "no-heel-strike"
+    """The swing foot does not come down in front within ``max_step_duration``."""
+
+
+_FALL_OF_STATUS = {
+    records.BACKWARD: PassiveFall.BACKWARD,
+    records.SIDEWAYS: PassiveFall.SIDEWAYS,
+    records.SLIP: PassiveFall.SLIP,
+    records.NO_STRIKE: PassiveFall.NO_HEEL_STRIKE,
+}
+
+
+@dataclass(frozen=True)
+class PassiveStep:
+    """One passive step.
+
+    Attributes
+    ----------
+    state : shape (6,)
+        Section state just after the heel strike, or where the walker was when it fell.
+    stance : "left" or "right"
+        The foot that stands in ``state``.
+    inter_leg_angle : float
+        Of ``state``, rad: negative, the new swing leg trails.
+    start_inter_leg_angle : float
+        At the start of the step, rad.
+    duration, heading_change : float
+    displacement : shape (2,)
+        Between contact reference points: downhill (x) and to the right (z), leg lengths.
+    fall : PassiveFall or None
+    normal_force, friction_demand : float
+        Least normal force (in weights) and greatest tangential over normal force.
+    gravity_work, impact_loss, ankle_loss : float
+        Energy given by gravity, lost at heel strike and in the ankle, in weight times leg length.
+    """
+
+    state: Vector
+    stance: Foot
+    inter_leg_angle: float
+    start_inter_leg_angle: float
+    duration: float
+    displacement: Vector
+    heading_change: float
+    fall: PassiveFall | None
+    normal_force: float
+    friction_demand: float
+    gravity_work: float
+    impact_loss: float
+    ankle_loss: float
+
+
+@dataclass(frozen=True)
+class PassiveWalk:
+    """A sequence of ``n`` completed passive steps.
+
+    Attributes
+    ----------
+    states : shape (n + 1, 6)
+    stances : n + 1 feet
+    inter_leg_angles : shape (n + 1,)
+    footprints : shape (n + 1, 2)
+        Contact reference points, (downhill, right), the first at the origin.
+    durations : shape (n,)
+    fall : PassiveFall or None
+        How the walk ended, if not by its number of steps.
+    """
+
+    states: Vector
+    stances: tuple[Foot, ...]
+    inter_leg_angles: Vector
+    footprints: Vector
+    durations: Vector
+    fall: PassiveFall | None
+
+    @property
+    def n_steps(self) -> int:
+        return len(self.durations)
+
+
+@dataclass(frozen=True)
+class PassiveWalker:
+    """A walker whose swing leg swings freely; its foot's mass is in the limit zero.
+
+    Parameters
+    ----------
+    parameters : WalkerParameters
+        Figure 6 A: ``foot_radius=0``, planar. B: a radius, planar. C: ``hip_width=0``. D: a width.
+        ``early_contact`` and ``shift_time`` have no meaning here.
+    planar : bool
+        Heading and ankle locked at zero, as in two dimensions; hip width then plays no part.
+        The locked motion is that of the free walker without hip width, started without lean.
+    """
+
+    parameters: WalkerParameters = WalkerParameters(slope=0.004)
+    planar: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.parameters, WalkerParameters):
+            raise ValueError(f"parameters must be WalkerParameters, not {self.parameters!r}")
+        if not isinstance(self.planar, (bool, np.bool_)):
+            raise ValueError(f"planar must be True or False, not {self.planar!r}")
+
+    @property
+    def moving_parameters(self) -> WalkerParameters:
+        """The parameters that the motion depends on: a planar walker has no hip width."""
+        return replace(self.parameters, hip_width=0.0) if self.planar else self.parameters
+
+    def step(
+        self, state: ArrayLike, *, stance: Foot = "left", inter_leg_angle: float | None = None
+    ) -> PassiveStep:
+        """Walk one step.
+
+        Parameters
+        ----------
+        state : shape (6,)
+            Section state just after heel strike, in the order of ``PASSIVE_STATE_FIELDS``.
+        stance : "left" or "right"
+        inter_leg_angle : (-pi/2, pi/2), optional
+            Where the swing leg starts, rad. By default behind, with both feet on the floor.
+
+        Raises
+        ------
+        ValueError
+            If an argument is outside its range, or no trailing foot can be on the floor too.
+        SolverError
+            If the integrator fails; never for a fall, which is a result.
+        """
+        start = require_passive_state(state, planar=self.planar)
+        foot = require_foot(stance)
+        angle = np.nan
+        if inter_leg_angle is not None:
+            angle = require_number(
+                "inter_leg_angle", inter_leg_angle, -QUARTER_TURN, QUARTER_TURN, "()"
+            )
+        row = step_passive_rows(self, start[None], [SIDE[foot]], [angle])[0]
+        return _result(PassiveOutcome(*row.tolist()), foot, start, self.parameters)
+
+    def walk(self, n_steps: int, *, state: ArrayLike, stance: Foot = "left") -> PassiveWalk:
+        """Walk ``n_steps`` steps, or until a fall, from both feet on the floor.
+
+        Raises
+        ------
+        ValueError, SolverError
+            As ``step``.
+        """
+        require_number("n_steps", n_steps, 1, 10_000_000)
+        result = None
+        current, foot = require_passive_state(state, planar=self.planar), require_foot(stance)
+        states, stances, angles = [current], [foot], []
+        footprints, durations = [np.zeros(2)], []
+        angle: float | None = None
+        for _ in range(int(n_steps)):
+            result = self.step(current, stance=foot, inter_leg_angle=angle)
+            angles.append(result.start_inter_leg_angle)
+            if result.fall is not None:
+                break
+            current, foot, angle = result.state, result.stance, result.inter_leg_angle
+            states.append(current)
+            stances.append(foot)
+            footprints.append(footprints[-1] + result.displacement)
+            durations.append(result.duration)
+        if len(angles) < len(states):
+            angles.append(angle)
+        return PassiveWalk(
+            states=np.array(states),
+            stances=tuple(stances),
+            inter_leg_angles=np.array(angles),
+            footprints=np.array(footprints),
+            durations=np.array(durations),
+            fall=None if result is None else result.fall,
+        )
+
+    def motion(
+        self,
+        state: ArrayLike,
+        *,
+        duration: float,
+        samples: int = 50,
+        stance: Foot = "left",
+        inter_leg_angle: float | None = None,
+    ) -> dict[str, Vector]:
+        """The motion within a step at uniform times: both legs and the swing foot's height.
+
+        The stance leg does not feel the swing leg: for the centre of mass and the contact force
+        ask ``Walker(parameters).stance_motion`` with the first five coordinates.
+
+        Parameters
+        ----------
+        state, stance, inter_leg_angle : see ``step``
+        duration : (0, 100]
+            How far to follow, usually ``PassiveStep.duration``.
+        samples : int >= 2
+
+        Returns
+        -------
+        dict
+            One array of shape (samples,) for each of ``MOTION_COLUMNS``.
+
+        Raises
+        ------
+        ValueError
+            If an argument is outside its range.
+        """
+        require_number("duration", duration, 0.0, 100.0, "(]")
+        require_number("samples", samples, 2, 1_000_000)
+        start = require_passive_state(state, planar=self.planar)
+        first = self.step(start, stance=stance, inter_leg_angle=inter_leg_angle)
+        rows = np.zeros((int(samples), len(MOTION_COLUMNS)))
+        passive_trace(
+            self.moving_parameters.body(),
+            start,
+            first.start_inter_leg_angle,
+            SIDE[require_foot(stance)],
+            float(duration),
+            rows,
+        )
+        return {name: rows[:, i].copy() for i, name in enumerate(MOTION_COLUMNS)}
+
+
+def require_passive_state(state: ArrayLike, *, planar: bool = False, name: str = "state") -> Vector:
+    """Return a passive section state as float array (6,), or raise ``ValueError``."""
+    try:
+        array = np.array(state, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must hold {PASSIVE_STATE_SIZE} numbers, not {state!r}") from error
+    if array.shape != (PASSIVE_STATE_SIZE,):
+        names = ", ".join(field.name for field in PASSIVE_STATE_FIELDS)
+        raise ValueError(
+            f"{name} must have shape ({PASSIVE_STATE_SIZE},): {names}; not {array.shape}"
+        )
+    require_state(array[:5], name)
+    if not abs(array[5]) < 1e6:
+        raise ValueError(f"{name}: inter_leg_rate must be in (-1e+06, 1e+06), not {array[5]}")
+    if planar and np.any(array[[0, 2, 4]] != 0.0):
+        raise ValueError(
+            f"{name}: a planar walker's heading, ankle_angle and ankle_rate must be 0, "
+            f"not {array[[0, 2, 4]].tolist()}"
+        )
+    return array
+
+
+def step_passive_rows(
+    walker: PassiveWalker, states: Vector, sides: ArrayLike, inter_leg_angles: ArrayLike
+) -> Vector:
+    """Step many states of one walker, unchecked; rows (n, 20) in the order of ``PassiveOutcome``.
+
+    Parameters
+    ----------
+    states : shape (n, 6)
+    sides : shape (n,)
+        +1 on the left foot, -1 on the right.
+    inter_leg_angles : shape (n,)
+        Where the swing legs start, NaN for both feet on the floor.
+    """
+    n = len(states)
+    results = np.empty((n, len(PassiveOutcome._fields)))
+    passive_batch(
+        np.array([walker.moving_parameters.body()]),
+        np.ascontiguousarray(states, dtype=float),
+        np.asarray(inter_leg_angles, dtype=float),
+        np.asarray(sides, dtype=float),
+        results,
+        0,
+        n,
+    )
+    return results
+
+
+def fall_of(status: float, stance_pitch: float) -> PassiveFall | None:
+    """The way a step ended, or None if it was completed."""
+    if status == records.LIFT_OFF:
+        return PassiveFall.FORWARD if stance_pitch < 0.0 else PassiveFall.LIFT_OFF
+    return _FALL_OF_STATUS.get(status)
+
+
+def _result(
+    outcome: PassiveOutcome, foot: Foot, start: Vector, parameters: WalkerParameters
+) -> PassiveStep:
+    if outcome.status == records.TRIP:
+        raise ValueError(
+            f"state {start.tolist()} has no trailing swing foot on the floor: its stance_pitch "
+            "must be positive and its lean within what the swing leg reaches"
+        )
+    raise_for_failure(outcome.status, start, parameters)
+    fall = fall_of(outcome.status, outcome.stance_pitch)
+    return PassiveStep(
+        state=np.array(outcome[:PASSIVE_STATE_SIZE]),
+        stance=foot if fall else OTHER_FOOT[foot],
+        inter_leg_angle=outcome.inter_leg_angle,
+        start_inter_leg_angle=outcome.start_inter_leg_angle,
+        duration=outcome.duration,
+        displacement=np.array([outcome.displacement_x, outcome.displacement_z]),
+        heading_change=outcome.heading_change,
+        fall=fall,
+        normal_force=outcome.least_normal_force,
+        friction_demand=outcome.greatest_friction,
+        gravity_work=outcome.gravity_work,
+        impact_loss=outcome.impact_loss,
+        ankle_loss=outcome.ankle_loss,
+    )
