@@ -1,0 +1,1 @@
+"""Gymnasium environments: one walker, many walkers, and the tasks they share."""

@@ -1,0 +1,127 @@
+"""What ``info`` tells: one table of names and where each number comes from, filled in one compiled call for one walker or many."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lean_yaw_env.envs import columns as c
+from lean_yaw_env.envs.tasks import Task
+from lean_yaw_env.kernel.compilation import entry_point
+from lean_yaw_env.kernel.records import Outcome
+from lean_yaw_env.parameters import STATE_SIZE, Vector
+from lean_yaw_env.walker import FALL_OF_STATUS
+
+
+class Source(IntEnum):
+    """Where a number of ``info`` is read."""
+
+    MEMORY = 0
+    OUTCOME = 1
+    QUOTIENT = 2
+    SPEED = 3
+
+
+_MEMORY_FIELDS = (
+    ("stance_side", c.SIDE),
+    ("mass_offset", c.OFFSET),
+    ("inter_leg_angle", c.INTER_LEG_ANGLE),
+    ("commanded_offset", c.COMMANDED_OFFSET),
+    ("time", c.TIME),
+    ("steps", c.STEPS),
+    ("distance", c.DISTANCE),
+)
+_OUTCOME_FIELDS = (
+    "duration",
+    "least_normal_force",
+    "greatest_friction",
+    "gravity_work",
+    "shift_work",
+    "impact_loss",
+    "ankle_loss",
+)
+_FIRST_SCALAR = STATE_SIZE + 2  # after the state and the footprint
+
+
+class InfoTable:
+    """The numbers of ``info`` for a task, in order.
+
+    ``state`` (5,) and ``footprint`` (2,) come first, then scalars: see ``describe``. ``fall`` is the way the walker fell in this step, or None.
+    """
+
+    def __init__(self, task: Task) -> None:
+        rows = [(Source.MEMORY, k, 0) for k in range(STATE_SIZE)]
+        rows += [(Source.MEMORY, c.PLACE_X, 0), (Source.MEMORY, c.PLACE_Z, 0)]
+        names: list[str] = []
+        for name, column in _MEMORY_FIELDS:
+            names.append(name)
+            rows.append((Source.MEMORY, column, 0))
+        for name in _OUTCOME_FIELDS:
+            names.append(name)
+            rows.append((Source.OUTCOME, Outcome._fields.index(name), 0))
+        names.append("speed")
+        rows.append((Source.SPEED, 0, 0))
+        for name, metric in task.metrics.items():
+            names.append(name)
+            kind = Source.MEMORY if metric.divisor is None else Source.QUOTIENT
+            rows.append((kind, metric.column, metric.divisor or 0))
+        if task.command_column is not None:
+            names.append("commanded_heading")
+            rows.append((Source.MEMORY, task.command_column, 0))
+        self.names = tuple(names)
+        self.sources = np.array(rows, dtype=np.int64)
+
+    def fill(self, memory: Vector, outcomes: Vector) -> Vector:
+        """A fresh array (numbers, walkers)."""
+        table = np.empty((len(self.sources), len(memory)))
+        fill_info(table, memory, outcomes, self.sources)
+        return table
+
+    def one(self, table: Vector, status: float) -> dict[str, Any]:
+        """The info of a single environment."""
+        column = table[:, 0]
+        info: dict[str, Any] = {"state": column[:STATE_SIZE], "footprint": column[STATE_SIZE:_FIRST_SCALAR]}
+        info.update(zip(self.names, column[_FIRST_SCALAR:].tolist(), strict=True))
+        fall = FALL_OF_STATUS.get(status)
+        info["fall"] = None if fall is None else fall.value
+        return info
+
+    def many(self, table: Vector, statuses: Vector, mask: NDArray[np.bool_]) -> dict[str, Any]:
+        """The infos of a vector environment, each key beside its mask; numbers outside the mask are zero."""
+        if not mask.all():
+            table[:, ~mask] = 0.0
+        falls = np.full(len(mask), None, dtype=object)
+        for i in np.flatnonzero((statuses > _STEPPED) & mask):
+            falls[i] = FALL_OF_STATUS[statuses[i]].value
+        info: dict[str, Any] = {
+            "state": table[:STATE_SIZE].T,
+            "footprint": table[STATE_SIZE:_FIRST_SCALAR].T,
+            **dict(zip(self.names, table[_FIRST_SCALAR:], strict=True)),
+            "fall": falls,
+        }
+        info.update({f"_{key}": mask for key in tuple(info)})
+        return info
+
+
+_STEPPED = 2.0
+_MEMORY, _OUTCOME, _QUOTIENT = (int(s) for s in (Source.MEMORY, Source.OUTCOME, Source.QUOTIENT))
+
+
+@entry_point()
+def fill_info(table, memory, outcomes, sources):
+    """Fill ``table`` (numbers, walkers) from the rows that ``sources`` names."""
+    for k in range(sources.shape[0]):
+        kind, a, b = sources[k, 0], sources[k, 1], sources[k, 2]
+        for i in range(memory.shape[0]):
+            if kind == _MEMORY:
+                table[k, i] = memory[i, a]
+            elif kind == _OUTCOME:
+                table[k, i] = outcomes[i, a]
+            elif kind == _QUOTIENT:
+                table[k, i] = memory[i, a] / memory[i, b] if memory[i, b] > 0.0 else 0.0
+            else:
+                duration = outcomes[i, c.OUTCOME_DURATION]
+                table[k, i] = memory[i, c.ADVANCE] / duration if duration > 0.0 else 0.0

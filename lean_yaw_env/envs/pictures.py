@@ -1,0 +1,70 @@
+"""What an environment's pictures need: the walk so far, kept only by environments that draw."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lean_yaw_env.envs import columns as c
+from lean_yaw_env.envs.rows import WalkerRows
+from lean_yaw_env.parameters import STATE_SIZE, Foot, Vector
+from lean_yaw_env.rendering.geometry import Pose, walker_shape
+from lean_yaw_env.rendering.scene import Scene, status_lines
+
+
+class Footage:
+    """Footprints and the centre of mass's path of row 0, and scenes made of them."""
+
+    def __init__(self, rows: WalkerRows) -> None:
+        self._rows = rows
+        self.restart()
+
+    def restart(self) -> None:
+        self._footprints: list[Vector] = []
+        self._headings: list[float] = []
+        self._feet: list[Foot] = []
+        self._path: list[Vector] = []
+        self.extend()
+
+    def extend(self) -> None:
+        """Take in the step that row 0 has just made."""
+        memory = self._rows.memory[0]
+        self._footprints.append(memory[[c.PLACE_X, c.PLACE_Z]])
+        self._headings.append(float(memory[c.HEADING]))
+        self._feet.append(self._foot())
+        centre = walker_shape(self._rows.parameters, self._pose()).centre
+        self._path.append(centre[[0, 2]])
+
+    def scene(self, fall: str | None) -> Scene:
+        memory = self._rows.memory[0]
+        column = self._rows.task.command_column
+        command = None if column is None else float(memory[column])
+        return Scene(
+            parameters=self._rows.parameters,
+            pose=self._pose(),
+            footprints=np.array(self._footprints),
+            headings=np.array(self._headings),
+            feet=tuple(self._feet),
+            path=np.array(self._path),
+            commanded_heading=command,
+            lines=status_lines(
+                step=int(memory[c.STEPS]),
+                time=float(memory[c.TIME]),
+                speed=float(memory[c.DISTANCE] / memory[c.TIME]) if memory[c.TIME] > 0.0 else None,
+                heading=float(memory[c.HEADING]),
+                commanded_heading=command,
+                status="walking" if fall is None else f"fell {fall}",
+            ),
+        )
+
+    def _foot(self) -> Foot:
+        return "left" if self._rows.memory[0, c.SIDE] > 0.0 else "right"
+
+    def _pose(self) -> Pose:
+        memory = self._rows.memory[0]
+        return Pose(
+            state=memory[:STATE_SIZE].copy(),
+            stance=self._foot(),
+            inter_leg_angle=float(memory[c.INTER_LEG_ANGLE]),
+            mass_offset=float(memory[c.OFFSET]),
+            contact=memory[[c.PLACE_X, c.PLACE_Z]],
+        )

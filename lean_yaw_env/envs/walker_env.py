@@ -1,0 +1,160 @@
+"""One walker as a Gymnasium environment; a step of it is a walking step."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.utils import EzPickle
+from numpy.typing import ArrayLike, NDArray
+
+from lean_yaw_env.envs import columns as c
+from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, action_space
+from lean_yaw_env.envs.pictures import Footage
+from lean_yaw_env.envs.rows import WalkerRows
+from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.rendering.pygame_renderer import Renderer
+from lean_yaw_env.walker import FALL_OF_STATUS
+
+RENDER_FPS = 4
+"""Walking steps per second of a video: near a walker of a metre's leg at Table 1's gait."""
+_ROW = np.array([0])
+
+
+class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
+    """The walker of Wisse and Schwab at a task; see ``docs/environments.md`` for each task's tables.
+
+    ## Action space
+    ``Box(-1, 1, (2,), float32)``; zero is the paper's fixed controller. Numbers outside [-1, 1] are clipped.
+
+    | number | what it sets for this step | default range |
+    |---|---|---|
+    | 0 | inter-leg angle: 0.3 + 0.15 a0 rad | 0.15 to 0.45 |
+    | 1 | mass offset 0.05 a1, within 0.005 of the offset in force, positive away from the stance foot's side if mirrored | +-0.05 |
+
+    ## Observation space
+    ``Box(-10, 10, float32)``: (value - centre) / scale, clipped to the box. Mirrored to a left stance by default.
+
+    | number | quantity | centre | scale |
+    |---|---|---|---|
+    | 0 | heading, rad | 0 | 0.6 |
+    | 1 | stance pitch, rad | 0.155 | 0.03 |
+    | 2 | ankle angle, rad | 0 | 0.05 |
+    | 3 | stance pitch rate | -0.42 | 0.1 |
+    | 4 | ankle rate | 0 | 0.1 |
+    | 5 | mass offset in force | 0 | 0.05 |
+    | 6 | stance foot, +1 left, -1 right (only with ``mirror=False``) | 0 | 1 |
+    | last | the task's features | | |
+
+    ## Ends
+    A fall is ``terminated``, the horizon of simulated time is ``truncated``.
+
+    Parameters
+    ----------
+    task : str
+        A name in ``lean_yaw_env.registration.TASK_VERSIONS``.
+    render_mode : None, "rgb_array" or "human"
+        Pictures need pygame, windows a display.
+    **options
+        See ``EnvOptions``.
+
+    Raises
+    ------
+    ValueError
+        If an option, an action or a reset option is bad; an environment is then unchanged.
+    NoGaitError
+        If the walker has no gait to start from.
+    SolverError
+        If the integrator gives up; never for a fall.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # pyright: ignore[reportIncompatibleVariableOverride]
+        "render_modes": ["rgb_array", "human"],
+        "render_fps": RENDER_FPS,
+    }
+
+    def __init__(self, task: str = "Heading", render_mode: str | None = None, **options: Any) -> None:
+        EzPickle.__init__(self, task, render_mode, **options)
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(
+                f"render_mode must be None, 'rgb_array' or 'human', not {render_mode!r}"
+            )
+        self.render_mode = render_mode
+        self.options = EnvOptions(**options)
+        self.task = task_named(task)
+        self.rows = WalkerRows(self.task, self.options, 1)
+        self.observation_space = self.options.observation_space(self.task)
+        self.action_space = action_space()
+        self._running = False
+        self._renderer = None if render_mode is None else Renderer()
+        self._footage: Footage | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin an episode: either foot, the gait and a random deviation.
+
+        ``options`` may hold ``state`` (a section state), ``stance`` ("left" or "right") and, for a task with one, ``command`` (a heading in
+        rad), in place of what would be drawn.
+        """
+        self.rows.check_options(options or {})
+        super().reset(seed=seed)
+        self.rows.start(_ROW, [self.np_random])
+        if options:
+            self.rows.place(_ROW, options)
+        self._running = True
+        if self._renderer is not None:
+            self._footage = Footage(self.rows)
+            self._show()
+        return self.rows.observations[0].copy(), self._info()
+
+    def step(
+        self, action: ArrayLike
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Walk one step."""
+        if not self._running:
+            raise ResetNeeded("call reset() before the first step and after the end of an episode")
+        rows = self.rows
+        chosen = np.asarray(action, dtype=np.float32)
+        if chosen.shape != (ACTION_SIZE,):
+            raise ValueError(f"action must have shape ({ACTION_SIZE},), not {chosen.shape}")
+        rows.actions[0] = chosen
+        rows.step_one()
+        terminated = bool(rows.terminated[0])
+        truncated = bool(rows.truncated[0])
+        self._running = not (terminated or truncated)
+        if self._footage is not None:
+            self._footage.extend()
+            self._show()
+        return rows.observations[0].copy(), float(rows.rewards[0]), terminated, truncated, self._info()
+
+    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The picture just after the last heel strike, for "rgb_array"; shape (height, width, 3)."""
+        if self.render_mode is None:
+            gym.logger.warn("render() draws nothing: make the environment with a render_mode")
+            return None
+        if self._footage is None or self._renderer is None:
+            raise ResetNeeded("call reset() before render()")
+        if self.render_mode == "human":
+            return None
+        return self._renderer.frame(self._footage.scene(self._fall()))
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+
+    def _show(self) -> None:
+        if self.render_mode == "human" and self._renderer and self._footage:
+            self._renderer.show(self._footage.scene(self._fall()), RENDER_FPS)
+
+    def _fall(self) -> str | None:
+        fall = FALL_OF_STATUS.get(float(self.rows.outcomes[0, c.OUTCOME_STATUS]))
+        return None if fall is None else fall.value
+
+    def _info(self) -> dict[str, Any]:
+        rows = self.rows
+        table = rows.info.fill(rows.memory, rows.outcomes)
+        return rows.info.one(table, rows.outcomes[0, c.OUTCOME_STATUS])

@@ -1,0 +1,27 @@
+"""Environment ids, stated once, and their registration with Gymnasium."""
+
+from __future__ import annotations
+
+from gymnasium.envs.registration import register, registry
+
+NAMESPACE = "LeanYaw"
+
+TASK_VERSIONS = {
+    "Heading": 0,
+    "Walk": 0,
+}
+"""Every task's name and version; the module of the same name in ``envs.tasks`` defines it."""
+
+ENV_IDS = tuple(f"{NAMESPACE}/{name}-v{version}" for name, version in TASK_VERSIONS.items())
+
+
+def register_envs() -> None:
+    """Register every environment that is not registered yet; calling it again does nothing."""
+    for name, env_id in zip(TASK_VERSIONS, ENV_IDS, strict=True):
+        if env_id not in registry:
+            register(
+                id=env_id,
+                entry_point="lean_yaw_env.envs.walker_env:WalkerEnv",
+                vector_entry_point="lean_yaw_env.envs.vector_env:WalkerVectorEnv",
+                kwargs={"task": name},
+            )
