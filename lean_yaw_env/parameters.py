@@ -33,8 +33,12 @@ class StateField(NamedTuple):
 
 
 STATE_FIELDS = (
-    StateField("heading", "phi", "rad", "direction in which the stance foot rolls; positive turns left"),
-    StateField("stance_pitch", "theta", "rad", "pitch of the stance foot, positive ahead of the hip"),
+    StateField(
+        "heading", "phi", "rad", "direction in which the stance foot rolls; positive turns left"
+    ),
+    StateField(
+        "stance_pitch", "theta", "rad", "pitch of the stance foot, positive ahead of the hip"
+    ),
     StateField("ankle_angle", "u6 / u5", "rad", "rotation of the leg against the stance foot"),
     StateField("stance_pitch_rate", "theta'", "rad / time unit", "rate of the stance pitch"),
     StateField("ankle_rate", "u6' / u5'", "rad / time unit", "rate of the ankle angle"),
@@ -116,7 +120,9 @@ class WalkerParameters:
         if not isinstance(self.slope_turns, (bool, np.bool_)):
             raise ValueError(f"slope_turns must be True or False, not {self.slope_turns!r}")
         if self.early_contact not in ("trip", "strike"):
-            raise ValueError(f"early_contact must be 'trip' or 'strike', not {self.early_contact!r}")
+            raise ValueError(
+                f"early_contact must be 'trip' or 'strike', not {self.early_contact!r}"
+            )
 
     def body(self) -> Body:
         """The same parameters as the kernels take them."""
@@ -161,7 +167,9 @@ def require_state(state: ArrayLike | Sequence[float], name: str = "state") -> Ve
     for field, value in zip(STATE_FIELDS, array, strict=True):
         bound = QUARTER_TURN if field.name in ("stance_pitch", "ankle_angle") else 1e6
         if not abs(value) < bound:
-            raise ValueError(f"{name}: {field.name} must be in ({-bound:g}, {bound:g}), not {value}")
+            raise ValueError(
+                f"{name}: {field.name} must be in ({-bound:g}, {bound:g}), not {value}"
+            )
     return array
 
 

@@ -83,7 +83,10 @@ class InfoTable:
     def one(self, table: Vector, status: float) -> dict[str, Any]:
         """The info of a single environment."""
         column = table[:, 0]
-        info: dict[str, Any] = {"state": column[:STATE_SIZE], "footprint": column[STATE_SIZE:_FIRST_SCALAR]}
+        info: dict[str, Any] = {
+            "state": column[:STATE_SIZE],
+            "footprint": column[STATE_SIZE:_FIRST_SCALAR],
+        }
         info.update(zip(self.names, column[_FIRST_SCALAR:].tolist(), strict=True))
         fall = FALL_OF_STATUS.get(status)
         info["fall"] = None if fall is None else fall.value

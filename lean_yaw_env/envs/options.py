@@ -86,7 +86,9 @@ class EnvOptions:
         NoGaitError
             If the walker has no gait to start from.
         """
-        change = task.max_offset_change if self.max_offset_change is None else self.max_offset_change
+        change = (
+            task.max_offset_change if self.max_offset_change is None else self.max_offset_change
+        )
         horizon = task.horizon if self.horizon is None else self.horizon
         row = np.zeros(c.SETTINGS)
         row[c.BASE_ANGLE] = INTER_LEG_ANGLE
@@ -121,5 +123,3 @@ def action_space() -> spaces.Box:
 def gait_of(parameters: WalkerParameters) -> tuple[float, ...]:
     """The walker's gait at the paper's command, on the left foot."""
     return tuple(find_gait(Walker(parameters)).tolist())
-
-

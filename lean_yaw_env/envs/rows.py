@@ -72,7 +72,9 @@ class WalkerRows:
             memory[c.PREVIOUS_HEADING] = memory[c.HEADING]
             if "command" in checked:
                 memory[self.task.command_column] = checked["command"]
-        self.task.start_many(self.memory, self.stream, self.settings, self.observations, rows, False)
+        self.task.start_many(
+            self.memory, self.stream, self.settings, self.observations, rows, False
+        )
 
     def check_options(self, options: dict[str, Any]) -> dict[str, Any]:
         """Reset options as numbers, or ``ValueError``."""
@@ -86,7 +88,9 @@ class WalkerRows:
             checked["state"] = require_state(options["state"])
         if "command" in options:
             if self.task.command_column is None:
-                raise ValueError(f"reset option 'command': the task {self.task.name} has no command")
+                raise ValueError(
+                    f"reset option 'command': the task {self.task.name} has no command"
+                )
             checked["command"] = require_number("command", options["command"], -np.pi, np.pi)
         return checked
 
@@ -107,4 +111,3 @@ class WalkerRows:
             raise SolverError(
                 f"the step from {self.memory[row, :STATE_SIZE].tolist()} of {self.parameters} did not converge"
             )
-

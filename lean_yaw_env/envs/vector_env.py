@@ -118,7 +118,9 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         rows = self.rows
         chosen = np.asarray(actions, dtype=np.float32)
         if chosen.shape != rows.actions.shape:
-            raise ValueError(f"actions must have shape ({self.num_envs}, {ACTION_SIZE}), not {chosen.shape}")
+            raise ValueError(
+                f"actions must have shape ({self.num_envs}, {ACTION_SIZE}), not {chosen.shape}"
+            )
         restarts = np.flatnonzero(self._ended)
         if len(restarts) and self.autoreset_mode is AutoresetMode.DISABLED:
             raise gym.error.ResetNeeded(
@@ -170,8 +172,14 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
     def _reset_mask(self, mask: Any) -> NDArray[np.bool_]:
         if mask is None:
             return np.ones(self.num_envs, dtype=np.bool_)
-        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            raise ValueError(f"reset_mask must be a bool array of shape ({self.num_envs},), not {mask!r}")
+        if (
+            not isinstance(mask, np.ndarray)
+            or mask.dtype != np.bool_
+            or mask.shape != (self.num_envs,)
+        ):
+            raise ValueError(
+                f"reset_mask must be a bool array of shape ({self.num_envs},), not {mask!r}"
+            )
         if not mask.any():
             raise ValueError("reset_mask must be true for at least one walker")
         return mask.copy()
@@ -185,7 +193,9 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         else:
             seeds = list(seed)
             if len(seeds) != self.num_envs:
-                raise ValueError(f"seed must be one number or {self.num_envs} of them, not {len(seeds)}")
+                raise ValueError(
+                    f"seed must be one number or {self.num_envs} of them, not {len(seeds)}"
+                )
         if self._generators is None:
             self._generators = [seeding.np_random(s)[0] for s in seeds]
             return

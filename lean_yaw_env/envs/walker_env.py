@@ -75,7 +75,9 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         "render_fps": RENDER_FPS,
     }
 
-    def __init__(self, task: str = "Heading", render_mode: str | None = None, **options: Any) -> None:
+    def __init__(
+        self, task: str = "Heading", render_mode: str | None = None, **options: Any
+    ) -> None:
         EzPickle.__init__(self, task, render_mode, **options)
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ValueError(
@@ -128,7 +130,13 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         if self._footage is not None:
             self._footage.extend()
             self._show()
-        return rows.observations[0].copy(), float(rows.rewards[0]), terminated, truncated, self._info()
+        return (
+            rows.observations[0].copy(),
+            float(rows.rewards[0]),
+            terminated,
+            truncated,
+            self._info(),
+        )
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """The picture just after the last heel strike, for "rgb_array"; shape (height, width, 3)."""

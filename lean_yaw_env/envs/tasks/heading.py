@@ -16,7 +16,9 @@ COMMAND = c.TASK
 STEPS_LEFT = c.TASK + 1
 ERROR_SUM = c.TASK + 2  # absolute heading error times duration
 SETTLED_SUM = c.TASK + 3  # time with an error below SETTLED
-SETTLING_SUM = c.TASK + 4  # time from each new command until first below SETTLED, of those that got there
+SETTLING_SUM = (
+    c.TASK + 4
+)  # time from each new command until first below SETTLED, of those that got there
 SETTLED_COMMANDS = c.TASK + 5
 SINCE_COMMAND = c.TASK + 6
 IS_SETTLED = c.TASK + 7
@@ -86,7 +88,16 @@ def task_features(memory, settings, observations, i, column):
 
 @entry_point()
 def step_one(
-    bodies, memory, stream, settings, actions, outcomes, observations, rewards, terminated, truncated
+    bodies,
+    memory,
+    stream,
+    settings,
+    actions,
+    outcomes,
+    observations,
+    rewards,
+    terminated,
+    truncated,
 ):
     return run_one(
         bodies, memory, stream, settings, actions, outcomes, observations, rewards, terminated,

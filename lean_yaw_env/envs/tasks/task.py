@@ -16,7 +16,6 @@ class Metric:
     divisor: int | None = None
 
 
-
 @dataclass(frozen=True)
 class Task:
     """A task for the walker: reset, observation features, reward and ends, as formulas compiled into its three loops.

@@ -33,7 +33,16 @@ def task_features(memory, settings, observations, i, column):
 
 @entry_point()
 def step_one(
-    bodies, memory, stream, settings, actions, outcomes, observations, rewards, terminated, truncated
+    bodies,
+    memory,
+    stream,
+    settings,
+    actions,
+    outcomes,
+    observations,
+    rewards,
+    terminated,
+    truncated,
 ):
     return run_one(
         bodies, memory, stream, settings, actions, outcomes, observations, rewards, terminated,
