@@ -1,4 +1,4 @@
-"""Pictures and films of walks. Drawing libraries are imported when something is drawn, not before."""
+"""Pictures and films of walks; drawing libraries are imported when something is drawn."""
 
 from lean_yaw_env.rendering.diagram import draw_walker
 from lean_yaw_env.rendering.film import film

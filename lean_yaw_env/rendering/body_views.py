@@ -1,4 +1,4 @@
-"""The walker from the side and from behind: legs, axle, masses, tilted ankle axes and cylinder feet on the sloping floor."""
+"""The walker from the side and from behind, on its sloping floor."""
 
 from __future__ import annotations
 
@@ -82,9 +82,7 @@ def _draw_floor(canvas: Canvas, camera: BodyCamera, scene: Scene) -> None:
     """The floor where it passes under the walker, with the last footprints on it."""
     panel, place = camera.panel, camera.place
     steepness = camera.right[1] / camera.up[1]
-    edge = np.array(
-        [[x, place[1] + steepness * (x - place[0])] for x in (panel.left, panel.right)]
-    )
+    edge = np.array([[x, place[1] + steepness * (x - place[0])] for x in (panel.left, panel.right)])
     corners = [[panel.right, panel.bottom], [panel.left, panel.bottom]]
     canvas.polygon(np.vstack([edge, corners]), GROUND)
     canvas.lines(edge, mixed(GROUND, INK, 0.45), 1.5)
@@ -127,7 +125,8 @@ def _draw_foot(canvas: Canvas, camera: BodyCamera, leg: LegShape, colour: Colour
 def _draw_axle(canvas: Canvas, camera: BodyCamera, shape: WalkerShape) -> None:
     for joint in (shape.stance_leg.hip, shape.swing_leg.hip):
         for mass in shape.masses:
-            canvas.bar(*camera.pixels(np.array([joint, mass])), mixed(INK, SKY, 0.3), 3.0)
+            start, end = camera.pixels(np.array([joint, mass]))
+            canvas.bar(start, end, mixed(INK, SKY, 0.3), 3.0)
 
 
 def _draw_masses(canvas: Canvas, camera: BodyCamera, shape: WalkerShape) -> None:
@@ -141,7 +140,10 @@ def _draw_masses(canvas: Canvas, camera: BodyCamera, shape: WalkerShape) -> None
 
 
 def _hull(points: Vector) -> Vector:
-    """Corners of the convex hull of points in the plane (Andrew's monotone chain); two or fewer if they are on a line."""
+    """Corners of the convex hull of points in the plane; two or fewer if they are on a line.
+
+    Andrew's monotone chain.
+    """
     ordered = np.unique(np.round(points, 6), axis=0).tolist()
 
     def chain(sequence: list[list[float]]) -> list[list[float]]:

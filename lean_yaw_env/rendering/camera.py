@@ -1,4 +1,4 @@
-"""Where things on the floor and on the walker come on the picture: pixels from leg lengths. Pure functions of what is seen."""
+"""Where things on the floor and on the walker come on the picture: pixels from leg lengths."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lean_yaw_env.parameters import Vector, WalkerParameters
 
@@ -59,9 +60,9 @@ class FloorCamera:
         """Half of what the panel shows, (downhill, right), in leg lengths."""
         return 0.5 * np.array([self.panel.height, self.panel.width]) / self.scale
 
-    def sees(self, points: Vector, margin: float = 0.0) -> Vector:
+    def sees(self, points: Vector, margin: float = 0.0) -> NDArray[np.bool_]:
         """Which floor points are within ``margin`` leg lengths of the panel; shape (n,), bool."""
-        return (np.abs(points - self.centre) <= self.reach + margin).all(axis=-1)
+        return np.all(np.abs(points - self.centre) <= self.reach + margin, axis=-1)
 
 
 def floor_camera(
@@ -98,7 +99,8 @@ def floor_camera(
 
 @dataclass(frozen=True, eq=False)
 class BodyCamera:
-    """Looks at the walker along a level line, without perspective; gravity points down on the picture.
+    """Looks at the walker along a level line, without perspective; gravity points down on the
+    picture.
 
     Attributes
     ----------
@@ -131,7 +133,10 @@ class BodyCamera:
 
 
 def upward(parameters: WalkerParameters, heading: float) -> Vector:
-    """Unit vector against gravity in the floor frame; a slope that turns with the walker falls to where its stance foot heads."""
+    """Unit vector against gravity in the floor frame; shape (3,).
+
+    A slope that turns with the walker falls to where its stance foot heads.
+    """
     falls_to = heading if parameters.slope_turns else 0.0
     sine, cosine = math.sin(parameters.slope), math.cos(parameters.slope)
     return np.array([-sine * math.cos(falls_to), cosine, sine * math.sin(falls_to)])

@@ -1,4 +1,4 @@
-"""A smooth drawing surface: pygame's primitives at twice the size, averaged down. It needs no display."""
+"""A smooth drawing surface that needs no display: pygame's primitives, averaged down."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ class Canvas:
     def clear(self) -> None:
         """Start a picture."""
         self._surface.fill(self._background)
-        # anew for each picture, for another user of pygame may have quit it meanwhile; pygame's own, so that every machine draws the same letters
+        # anew for each picture, for another user of pygame may have quit it meanwhile; pygame's
+        # own, so that every machine draws the same letters
         self._freetype.init()
         self._font = self._freetype.Font(None, OVERSAMPLING * TEXT_SIZE)
         self._font.origin = True
@@ -104,7 +105,10 @@ class Canvas:
         count = max(1, 2 * round(0.5 * (np.linalg.norm(end - start) / dash - 1.0)) + 1)
         for i in range(0, count, 2):
             self.bar(
-                start + (end - start) * i / count, start + (end - start) * (i + 1) / count, colour, width
+                start + (end - start) * i / count,
+                start + (end - start) * (i + 1) / count,
+                colour,
+                width,
             )
 
     def disc(self, centre: Vector, radius: float, colour: Colour) -> None:
@@ -144,7 +148,8 @@ class Canvas:
         Parameters
         ----------
         place, anchor : (float, float)
-            ``anchor`` says which point of the line's box comes to ``place``: (0, 0) the upper left, (1, 1) the lower right.
+            ``anchor`` says which point of the line's box comes to ``place``: (0, 0) the upper left,
+            (1, 1) the lower right.
         size : float
             Height of the letters' box, pixels.
         ground : Colour, optional
@@ -152,7 +157,9 @@ class Canvas:
         """
         fine = OVERSAMPLING * size
         width = self._font.get_rect(words, size=fine).width
-        height = 0.75 * fine  # of capitals: lines of one size share their baseline, whichever letters they have
+        height = (
+            0.75 * fine
+        )  # of capitals: lines of one size share their baseline, whichever letters they have
         left = OVERSAMPLING * place[0] - anchor[0] * width
         top = OVERSAMPLING * place[1] - anchor[1] * height
         if ground is not None:

@@ -1,4 +1,4 @@
-"""One labelled drawing of the walker with its parameters and coordinates, after the paper's Figure 5."""
+"""A labelled drawing of the walker with its parameters, after the paper's Figure 5."""
 
 from __future__ import annotations
 
@@ -31,17 +31,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # A pose in which everything can be seen; no gait leans or turns so far.
-_HEADING, _STANCE_PITCH, _INTER_LEG_ANGLE, _LEAN, _MASS_OFFSET = 0.35, 0.2, 0.5, 0.3, 0.09
+_HEADING, _STANCE_PITCH, _INTER_LEG_ANGLE, _LEAN, _MASS_OFFSET = 0.35, 0.2, 0.5, 0.25, 0.1
 _LEAST_SLOPE = 0.09  # a gait's own slope would look level
 _DPI = 150
+_INCHES = 2.9  # per leg length
+_HEIGHT = 1.45  # of each drawing, in leg lengths
 _AXIS_ABOVE, _AXIS_BELOW = 0.42, 0.14
 _RIGHT, _UP = np.array([1.0, 0.0]), np.array([0.0, 1.0])
 
 
 def draw_walker(parameters: WalkerParameters, path: str | os.PathLike[str]) -> None:
-    """Draw the walker from the side, from behind and from above, with its parameters' names, to a .png, .svg or .pdf.
+    """Draw the walker from the side, from behind and from above, with its parameters' names, to a
+    .png, .svg or .pdf.
 
-    The proportions are the parameters'; the pose, and a slope too slight to be seen, are exaggerated, and the picture says so.
+    The proportions are the parameters'; the pose, and a slope too slight to be seen, are
+    exaggerated, and the picture says so.
 
     Raises
     ------
@@ -51,8 +55,9 @@ def draw_walker(parameters: WalkerParameters, path: str | os.PathLike[str]) -> N
         If matplotlib is not installed.
     """
     place = require_ending(path, ENDINGS)
-    figure = new_figure(12.0, 5.0)
-    side, rear, top = figure.subplots(1, 3, width_ratios=(1.25, 1.0, 1.0))
+    widths = (1.7, 0.9 + parameters.hip_width, 1.0 + parameters.hip_width)
+    figure = new_figure(_INCHES * sum(widths), _INCHES * _HEIGHT + 1.0)
+    side, rear, top = figure.subplots(1, 3, width_ratios=widths)
     _draw_side(side, parameters)
     _draw_rear(rear, parameters)
     _draw_top(top, parameters)
@@ -67,13 +72,16 @@ def draw_walker(parameters: WalkerParameters, path: str | os.PathLike[str]) -> N
 
 def _caption(parameters: WalkerParameters) -> str:
     values = (
-        rf"hip width $d$ = {parameters.hip_width:g}     foot radius $r$ = {parameters.foot_radius:g}     "
-        rf"ankle tilt $\alpha$ = {parameters.ankle_tilt:g} rad     slope $\gamma$ = {parameters.slope:g} rad"
+        f"hip width $d$ = {parameters.hip_width:g}",
+        f"foot radius $r$ = {parameters.foot_radius:g}",
+        rf"ankle tilt $\alpha$ = {parameters.ankle_tilt:g} rad",
+        rf"slope $\gamma$ = {parameters.slope:g} rad",
     )
-    return (
-        values + "\n" + r"stance pitch $\theta$, ankle angle $u$, heading $\varphi$, "
-        r"inter-leg angle $\Delta$ and mass offset $\mu$, like the slope, drawn large to be seen; leg length 1"
+    coordinates = (
+        r"stance pitch $\theta$, ankle angle $u$, heading $\varphi$, inter-leg angle $\Delta$ "
+        r"and mass offset $\mu$, like the slope, drawn large to be seen; leg length 1"
     )
+    return (5 * " ").join(values) + "\n" + coordinates
 
 
 class _View:
@@ -96,26 +104,27 @@ def _draw_side(axes: Axes, parameters: WalkerParameters) -> None:
     view = _View(np.cross(up, np.array([0.0, 0.0, 1.0])), up)
     downhill, normal = view(np.array([1.0, 0.0, 0.0])), view(np.array([0.0, 1.0, 0.0]))
     contact = view(shape.contact)
-    _draw_floor(axes, contact, downhill, 0.75, 1.15)
+    _draw_floor(axes, contact, downhill, 0.6, 0.85)
     _draw_leg(axes, view, shape.swing_leg, 0.5)
     _draw_leg(axes, view, shape.stance_leg, 0.0)
     hip = view(shape.stance_leg.hip)
     _draw_mass(axes, hip)
     if slope != 0.0:
-        start = contact - 0.7 * downhill if slope > 0.0 else contact + 1.1 * downhill
+        start = contact - 0.57 * downhill if slope > 0.0 else contact + 0.82 * downhill
         ahead = _RIGHT if slope > 0.0 else -_RIGHT
         along = downhill if slope > 0.0 else -downhill
-        _line(axes, start, start + 0.6 * ahead, FAINT_INK, 0.8, "--")
-        _draw_angle(axes, start, ahead, along, 0.5, r"$\gamma$")
+        _line(axes, start, start + 0.4 * ahead, FAINT_INK, 0.8, "--")
+        _draw_angle(axes, start, ahead, along, 0.3, r"$\gamma$")
     ankle = view(shape.stance_leg.ankle)
-    _line(axes, ankle, ankle + 0.72 * normal, FAINT_INK, 0.8, "--")
-    _draw_angle(axes, ankle, normal, hip - ankle, 0.62, r"$\theta$")
+    _line(axes, ankle, ankle + 0.75 * normal, FAINT_INK, 0.8, "--")
+    _draw_angle(axes, ankle, normal, hip - ankle, 0.66, r"$\theta$")
     axis = view(shape.stance_leg.ankle_axis)
-    _draw_angle(axes, ankle, hip - ankle, -axis, 0.36, r"$\alpha$", ANKLE_AXIS)
-    _draw_angle(axes, hip, ankle - hip, view(shape.swing_leg.ankle) - hip, 0.45, r"$\Delta$")
+    _draw_angle(axes, ankle, hip - ankle, -axis, 0.38, r"$\alpha$", ANKLE_AXIS)
+    _draw_angle(axes, hip, ankle - hip, view(shape.swing_leg.ankle) - hip, 0.5, r"$\Delta$")
     _draw_radius(axes, view, shape, parameters.foot_radius)
-    _draw_gravity(axes, np.array([hip[0] + 0.55, hip[1] - 0.05]))
-    _label(axes, 0.5 * (hip + ankle), "1", (-9, 0))
+    _draw_gravity(axes, np.array([hip[0] + 0.62, hip[1]]))
+    _label(axes, hip + 0.4 * (ankle - hip), "1", (-10, 0))
+    _set_window(axes, contact - np.array([0.75, 0.25]), 1.7)
 
 
 def _draw_radius(axes: Axes, view: _View, shape: WalkerShape, radius: float) -> None:
@@ -130,13 +139,11 @@ def _draw_radius(axes: Axes, view: _View, shape: WalkerShape, radius: float) -> 
 
 
 def _draw_rear(axes: Axes, parameters: WalkerParameters) -> None:
-    pose = Pose(
-        np.array([0.0, 0.0, -_LEAN, 0.0, 0.0]), "right", 0.25, mass_offset=_MASS_OFFSET
-    )
+    pose = Pose(np.array([0.0, 0.0, -_LEAN, 0.0, 0.0]), "right", 0.45, mass_offset=_MASS_OFFSET)
     shape = walker_shape(parameters, pose)
     view = _View(np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]))
     contact = view(shape.contact)
-    _draw_floor(axes, contact, _RIGHT, 0.45 + parameters.hip_width, 0.45)
+    _draw_floor(axes, contact, _RIGHT, 0.35 + parameters.hip_width, 0.35)
     _draw_leg(axes, view, shape.swing_leg, 0.5)
     _draw_leg(axes, view, shape.stance_leg, 0.0)
     hips = view(np.array([shape.swing_leg.hip, shape.stance_leg.hip]))
@@ -151,14 +158,17 @@ def _draw_rear(axes: Axes, parameters: WalkerParameters) -> None:
     _draw_span(axes, hips[1] + 0.09 * across, masses[1] + 0.09 * across, r"$\mu$")
     ankle = view(shape.stance_leg.ankle)
     _line(axes, ankle, ankle + 0.8 * _UP, FAINT_INK, 0.8, "--")
-    _draw_angle(axes, ankle, _UP, hips[1] - ankle, 0.7, "lean")
+    _draw_angle(axes, ankle, _UP, hips[1] - ankle, 0.7, "")
+    _label(axes, ankle + 0.7 * _UP, "lean", (18, 0))
     above = view(shape.stance_leg.ankle - _AXIS_ABOVE * shape.stance_leg.ankle_axis)
     _draw_turn(axes, above, ankle - above)
+    width = 0.9 + parameters.hip_width
+    _set_window(axes, contact - np.array([width - 0.4, 0.2]), width)
 
 
 def _draw_top(axes: Axes, parameters: WalkerParameters) -> None:
     stance: Foot = "right"
-    pose = Pose(np.array([_HEADING, 0.1, 0.0, 0.0, 0.0]), stance, 0.3)
+    pose = Pose(np.array([_HEADING, -0.05, 0.0, 0.0, 0.0]), stance, 0.4)
     shape = walker_shape(parameters, pose)
     length = footprint_length(parameters.foot_radius)
     foot = np.zeros(2)
@@ -167,7 +177,11 @@ def _draw_top(axes: Axes, parameters: WalkerParameters) -> None:
     for leg, place, alpha in ((shape.stance_leg, foot, 1.0), (shape.swing_leg, swing[::-1], 0.4)):
         outline = footprint_outlines(place[None], np.array([_HEADING]), [leg.foot], length)[0]
         axes.fill(
-            outline[:, 1], outline[:, 0], color=unit_colour(FOOT_COLOURS[leg.foot]), alpha=alpha, lw=0
+            outline[:, 1],
+            outline[:, 0],
+            color=unit_colour(FOOT_COLOURS[leg.foot]),
+            alpha=alpha,
+            lw=0,
         )
     hips = view(np.array([shape.stance_leg.hip, shape.swing_leg.hip]))
     _line(axes, hips[0], hips[1], mixed(INK, (255, 255, 255), 0.3), 2.5)
@@ -179,8 +193,13 @@ def _draw_top(axes: Axes, parameters: WalkerParameters) -> None:
     _label(axes, 0.75 * _UP, "downhill", (0, 8), FAINT_INK)
     _label(axes, 0.75 * heading, "heading", (0, 8), FOOT_COLOURS[stance])
     _draw_angle(axes, foot, _UP, heading, 0.6, r"$\varphi$")
-    axes.set_xlim(-0.45 - parameters.hip_width, 0.4)
-    axes.set_ylim(-0.3, 0.95)
+    width = 1.0 + parameters.hip_width
+    _set_window(axes, np.array([0.4 - width, -0.5]), width)
+
+
+def _set_window(axes: Axes, corner: Vector, width: float) -> None:
+    axes.set_xlim(corner[0], corner[0] + width)
+    axes.set_ylim(corner[1], corner[1] + _HEIGHT)
 
 
 def _draw_floor(axes: Axes, contact: Vector, along: Vector, back: float, front: float) -> None:
@@ -196,15 +215,23 @@ def _draw_leg(axes: Axes, view: _View, leg: LegShape, fading: float) -> None:
     for arc in (leg.inner_arc, leg.outer_arc):
         axes.fill(*view(arc).T, color=unit_colour(mixed(colour, white, 0.6)), lw=0)
     sole = np.vstack([leg.inner_arc, leg.outer_arc[::-1]])
-    axes.fill(*view(sole).T, facecolor=unit_colour(mixed(colour, white, 0.6)), edgecolor=unit_colour(colour))
+    axes.fill(
+        *view(sole).T,
+        facecolor=unit_colour(mixed(colour, white, 0.6)),
+        edgecolor=unit_colour(colour),
+    )
     _line(axes, view(leg.ankle), view(leg.hip), colour, 4.5)
     ends = view(
-        np.array([leg.ankle - _AXIS_ABOVE * leg.ankle_axis, leg.ankle + _AXIS_BELOW * leg.ankle_axis])
+        np.array(
+            [leg.ankle - _AXIS_ABOVE * leg.ankle_axis, leg.ankle + _AXIS_BELOW * leg.ankle_axis]
+        )
     )
     _line(axes, ends[0], ends[1], mixed(ANKLE_AXIS, white, fading), 1.3, (0, (5, 2, 1, 2)))
 
 
-def _line(axes: Axes, start: Vector, end: Vector, colour: Colour, width: float, style: object = "-") -> None:
+def _line(
+    axes: Axes, start: Vector, end: Vector, colour: Colour, width: float, style: object = "-"
+) -> None:
     axes.plot(
         [start[0], end[0]],
         [start[1], end[1]],
@@ -231,6 +258,7 @@ def _label(
         va="center",
         color=unit_colour(colour),
         fontsize=13 if words.startswith("$") else 10,
+        annotation_clip=False,
     )
 
 
@@ -257,21 +285,29 @@ def _draw_angle(
 
 def _draw_span(axes: Axes, start: Vector, end: Vector, words: str) -> None:
     """A dimension line between two points, its name above."""
-    axes.annotate(
-        "",
-        tuple(start),
-        xytext=tuple(end),
-        arrowprops={"arrowstyle": "<->", "color": unit_colour(INK), "lw": 0.9, "shrinkA": 0, "shrinkB": 0},
-    )
+    _draw_patch(axes, np.array([start, end]), "<->", INK, 0.9)
     _label(axes, 0.5 * (start + end), words, (0, 9))
 
 
 def _draw_arrow(axes: Axes, start: Vector, along: Vector, colour: Colour) -> None:
-    axes.annotate(
-        "",
-        tuple(start + along),
-        xytext=tuple(start),
-        arrowprops={"arrowstyle": "-|>", "color": unit_colour(colour), "lw": 1.4, "shrinkA": 0, "shrinkB": 0},
+    _draw_patch(axes, np.array([start, start + along]), "-|>", colour, 1.4)
+
+
+def _draw_patch(axes: Axes, points: Vector, style: str, colour: Colour, width: float) -> None:
+    """An arrow along points."""
+    from matplotlib.patches import FancyArrowPatch
+    from matplotlib.path import Path
+
+    axes.add_patch(
+        FancyArrowPatch(
+            path=Path(points),
+            arrowstyle=style,
+            color=unit_colour(colour),
+            fill=style == "-|>",
+            linewidth=width,
+            mutation_scale=11.0,
+            clip_on=False,
+        )
     )
 
 
@@ -287,6 +323,5 @@ def _draw_turn(axes: Axes, place: Vector, along: Vector) -> None:
     local = np.column_stack([0.02 * np.cos(s), 0.06 * np.sin(s)])
     cosine, sine = math.cos(angle), math.sin(angle)
     ring = place + local @ np.array([[cosine, sine], [-sine, cosine]])
-    axes.plot(*ring.T, color=unit_colour(ANKLE_AXIS), linewidth=1.2)
-    _draw_arrow(axes, ring[-2], ring[-1] - ring[-2], ANKLE_AXIS)
-    _label(axes, place, "$u$", (14, 2), ANKLE_AXIS)
+    _draw_patch(axes, ring, "->", ANKLE_AXIS, 1.2)
+    _label(axes, place, "$u$", (20, 6), ANKLE_AXIS)

@@ -21,7 +21,7 @@ def require_ending(path: str | os.PathLike[str], endings: tuple[str, ...]) -> Pa
 
 @contextlib.contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
-    """A temporary file beside ``path`` that takes its place when the block ends without an error."""
+    """A temporary file beside ``path`` that takes its place when the block ends well."""
     handle, name = tempfile.mkstemp(suffix=path.suffix, prefix=f".{path.stem}-", dir=path.parent)
     os.close(handle)
     temporary = Path(name)

@@ -22,9 +22,9 @@ from lean_yaw_env.rendering.scene import Scene, status_lines
 from lean_yaw_env.walker import Walk, Walker
 
 SECONDS_PER_TIME_UNIT = 1.0 / math.sqrt(9.81)
-"""sqrt(leg length / gravity) of a walker with legs of one metre on earth: such a film runs in real time."""
+"""sqrt(leg length / gravity) for legs of one metre on earth: the film runs in real time."""
 SWING_SHARE = 0.5
-"""Share of a step in which the film brings the swing leg forward; the model has it in front at once, and massless."""
+"""Share of a step in which the swing leg is drawn on its way; the model has it in front at once."""
 HOLD_SECONDS = 1.0
 """How long a film stays with a walker that has fallen."""
 _SAMPLES = 33  # per step; straight lines between them are wrong by less than 1e-4 leg lengths
@@ -38,7 +38,8 @@ Writer = Callable[[Path, Iterable[Frame], float, tuple[int, int]], None]
 class _Recording:
     """A walk with the motion within its steps, the unfinished one of a fall included.
 
-    ``ends`` are the steps' ends in time; ``coordinates`` has shape (steps, samples, 3), ``path`` shape (steps, samples, 2).
+    ``ends`` are the steps' ends in time; ``coordinates`` has shape (steps, samples, 3), ``path``
+    shape (steps, samples, 2).
     """
 
     walk: Walk
@@ -73,7 +74,8 @@ def film(
     walker : Walker
     n_steps, state, stance, inter_leg_angle, mass_offset, previous_offset : see ``Walker.walk``
     path : str or path
-        An .mp4 or a .gif; written whole or not at all. A gif's frames last whole hundredths of a second, to which its rate is rounded.
+        An .mp4 or a .gif; written whole or not at all. A gif's frames last whole hundredths of a
+        second, to which its rate is rounded.
     commanded_heading : float, or one per step, optional
         rad; drawn as an arrow.
     fps : [1, 120]
@@ -81,7 +83,8 @@ def film(
     seconds_per_time_unit : (0, 100]
         Of the film; by default real time for legs of one metre.
     swing_share : [0, 1]
-        Share of a step in which the swing leg is drawn on its way to the front. The model has it there at once: massless, it acts on nothing.
+        Share of a step in which the swing leg is drawn on its way to the front. The model has it
+        there at once: massless, it acts on nothing.
     size : (width, height)
         Pixels.
     progress : bool
@@ -153,7 +156,10 @@ def _record(
     coordinates, path = [], []
     for i, duration in enumerate(durations):
         motion = walker.stance_motion(
-            walk.states[i], duration=duration, samples=_SAMPLES, **_command(walk, i, angles, offsets)
+            walk.states[i],
+            duration=duration,
+            samples=_SAMPLES,
+            **_command(walk, i, angles, offsets),
         )
         coordinates.append(np.column_stack([motion[name] for name in _COORDINATES]))
         cosine, sine = math.cos(walk.headings[i]), math.sin(walk.headings[i])
@@ -201,12 +207,16 @@ def _scene(walker: Walker, recording: _Recording, time: float, swing_share: floa
         footprints=walk.footprints[seen],
         headings=walk.headings[seen],
         feet=walk.stances[seen],
-        path=np.vstack([recording.path[:i].reshape(-1, 2), recording.path[i, : math.floor(place) + 1]]),
+        path=np.vstack(
+            [recording.path[:i].reshape(-1, 2), recording.path[i, : math.floor(place) + 1]]
+        ),
         commanded_heading=commanded,
         lines=status_lines(
             step=i,
             time=time,
-            speed=float(np.linalg.norm(walk.footprints[i] - recent[0]) / recent[1]) if i >= 2 else None,
+            speed=float(np.linalg.norm(walk.footprints[i] - recent[0]) / recent[1])
+            if i >= 2
+            else None,
             heading=float(walk.headings[max(i - 1, 0) : i + 1].mean()),
             commanded_heading=commanded,
             status=f"falls: {walk.fall.value}" if fallen and walk.fall else "walking",
@@ -215,7 +225,7 @@ def _scene(walker: Walker, recording: _Recording, time: float, swing_share: floa
 
 
 def _swing_angle(angles: Vector, i: int, share: float, swing_share: float) -> float:
-    """The inter-leg angle as drawn: from behind, where the old stance leg was left, smoothly to the front."""
+    """The inter-leg angle as drawn: from where the old stance leg was left to the front."""
     if i == 0 or share >= swing_share:
         return float(angles[i])
     s = share / swing_share
@@ -224,16 +234,19 @@ def _swing_angle(angles: Vector, i: int, share: float, swing_share: float) -> fl
 
 
 def _with_last_repeated(frames: Iterable[Frame], count: int) -> Iterator[Frame]:
-    frame = None
+    last: list[Frame] = []
     for frame in frames:
+        last = [frame]
         yield frame
-    for _ in range(count if frame is not None else 0):
-        assert frame is not None
-        yield frame
+    for _ in range(count):
+        yield from last
 
 
 def _gif_rate(fps: float) -> float:
-    """The nearest rate whose frames last whole hundredths of a second, at least two: viewers slow faster ones down."""
+    """The nearest rate whose frames last whole hundredths of a second.
+
+    At least two of them: viewers slow faster films down.
+    """
     return 100.0 / max(round(100.0 / fps), 2)
 
 
@@ -264,7 +277,12 @@ def _gif_writer() -> Writer:
         first = next(pictures).quantize(128, dither=image.Dither.NONE)
         rest = (picture.quantize(palette=first, dither=image.Dither.NONE) for picture in pictures)
         first.save(
-            path, save_all=True, append_images=rest, duration=round(1000.0 / fps), loop=0, optimize=False
+            path,
+            save_all=True,
+            append_images=rest,
+            duration=round(1000.0 / fps),
+            loop=0,
+            optimize=False,
         )
 
     return write

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from lean_yaw_env.parameters import Foot, Vector
 from lean_yaw_env.rendering.geometry import half_arc
@@ -13,8 +14,9 @@ from lean_yaw_env.walker import SIDE
 LEAST_LENGTH = 0.14
 """A point foot leaves a print too, for the eye, in leg lengths."""
 
-# A left sole of length one, from the heel clockwise: (ahead, to the right); the inner edge, on the right, is hollow.
-_SOLE = np.array(
+# A left sole of length one, from the heel clockwise: (ahead, to the right); the inner edge, on the
+# right, is hollow.
+_SOLE_KNOTS = np.array(
     [
         (-0.50, 0.01),
         (-0.47, 0.09),
@@ -35,6 +37,17 @@ _SOLE = np.array(
         (-0.47, -0.07),
     ]
 )
+CORNERS_PER_KNOT = 3
+"""Corners of an outline for each of the points that shape it."""
+
+
+def _smooth_sole() -> Vector:
+    closed = np.vstack([_SOLE_KNOTS, _SOLE_KNOTS[:1]])
+    curve = CubicSpline(np.arange(len(closed)), closed, bc_type="periodic")
+    return curve(np.arange(len(_SOLE_KNOTS) * CORNERS_PER_KNOT) / CORNERS_PER_KNOT)
+
+
+_SOLE = _smooth_sole()
 _SOLE.flags.writeable = False
 
 

@@ -1,7 +1,9 @@
-"""From a walker's coordinates to its shape in space: hips, masses, legs, tilted ankle axes and cylinder feet.
+"""From a walker's coordinates to its shape in space: hips, masses, legs, tilted ankle axes and
+cylinder feet.
 
-The floor frame has x straight downhill, y along the floor's normal and z to the right of someone facing downhill; lengths are in leg lengths.
-Plain numpy, and on purpose not the kernels' formulas: these go by rotation matrices, so that pictures and kernels check each other.
+The floor frame has x straight downhill, y along the floor's normal and z to the right of someone
+facing downhill; lengths are in leg lengths. Plain numpy, and on purpose not the kernels' formulas:
+these go by rotation matrices, so that pictures and kernels check each other.
 """
 
 from __future__ import annotations
@@ -26,18 +28,23 @@ from lean_yaw_env.parameters import (
 from lean_yaw_env.walker import OTHER_FOOT, SIDE
 
 FOOT_HALF_LENGTH = 0.16
-"""Arc from the sole's middle to its end, where the foot's radius allows it: a step of 0.3 rolls over half of it either way."""
+"""Arc from the sole's middle to its end, of which a step of 0.3 rolls over half either way."""
 LEAST_HALF_ARC, GREATEST_HALF_ARC = 0.3, QUARTER_TURN
-"""Bounds of the drawn arc's half angle, rad: enough to roll over at the largest commands, and no more than half a circle."""
+"""Bounds of the arc's half angle, rad: what large commands roll over, and half a circle in all."""
 FOOT_HALF_WIDTH = 0.04
-"""Half width of the drawn cylinder; the model's is any that does not tip over (paper, section 3)."""
+"""Half width of the drawn cylinder; the model's is any that does not tip over (section 3)."""
 _ARC_POINTS = 13
 _LEAST_UPRIGHT = 1e-9  # below it the swing foot's axis is vertical, and no ankle angle lays it flat
 
 
 def require_finite(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Vector:
-    """Return finite numbers as a float array of ``shape`` (None: any length), or raise ``ValueError``."""
-    wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
+    """Return finite numbers as a float array of ``shape`` (None: any length), or ``ValueError``."""
+    wanted = (
+        "("
+        + ", ".join("n" if n is None else str(n) for n in shape)
+        + ("," if len(shape) == 1 else "")
+        + ")"
+    )
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError) as error:
@@ -81,9 +88,7 @@ class Pose:
     contact: Vector = field(default_factory=lambda: np.zeros(2))
 
     def __post_init__(self) -> None:
-        angle = require_number(
-            "inter_leg_angle", self.inter_leg_angle, -QUARTER_TURN, QUARTER_TURN
-        )
+        angle = require_number("inter_leg_angle", self.inter_leg_angle, -QUARTER_TURN, QUARTER_TURN)
         object.__setattr__(self, "state", require_finite("state", self.state, (STATE_SIZE,)))
         object.__setattr__(self, "stance", require_foot(self.stance))
         object.__setattr__(self, "inter_leg_angle", angle)
@@ -182,9 +187,10 @@ def walker_shape(parameters: WalkerParameters, pose: Pose) -> WalkerShape:
 
     Notes
     -----
-    Foot frame F = Ry(heading) Rz(pitch); the cylinder's centre rolls to C = P0 - r pitch h + r n; the ankle is on the sole at
-    A = C + F (0, -r, 0); the leg's frame is L = F Ra(ankle angle), the hip a leg length along its second axis, the axle its third.
-    The swing leg is turned by the inter-leg angle about the axle, and its ankle keeps the cylinder's axis horizontal.
+    Foot frame F = Ry(heading) Rz(pitch); the cylinder's centre rolls to C = P0 - r pitch h + r n;
+    the ankle is on the sole at A = C + F (0, -r, 0); the leg's frame is L = F Ra(ankle angle), the
+    hip a leg length along its second axis, the axle its third. The swing leg is turned by the
+    inter-leg angle about the axle, and its ankle keeps the cylinder's axis horizontal.
     """
     heading, pitch, ankle_angle = (float(value) for value in pose.state[:3])
     radius = parameters.foot_radius
@@ -218,10 +224,12 @@ def walker_shape(parameters: WalkerParameters, pose: Pose) -> WalkerShape:
 
 
 def _flat_ankle_angle(leg: Vector, ankle_axis: Vector) -> float:
-    """The ankle angle, less than a quarter turn, that makes a foot's cylinder axis horizontal under a leg of this frame.
+    """The ankle angle, less than a quarter turn, that makes a foot's cylinder axis horizontal under
+    a leg of this frame.
 
-    The cylinder's axis is e3 cos(b) + e1 sin(b), with e1 square to the ankle axis and to the axle. A leg so far back that its ankle axis
-    is past the vertical has no such angle; its foot is drawn square to it.
+    The cylinder's axis is e3 cos(b) + e1 sin(b), with e1 square to the ankle axis and to the axle.
+    A leg so far back that its ankle axis is past the vertical has no such angle; its foot is drawn
+    square to it.
     """
     e1 = leg @ np.array([-ankle_axis[1], ankle_axis[0], 0.0])
     if e1[1] < _LEAST_UPRIGHT:

@@ -1,4 +1,4 @@
-"""Colours of pictures and films, the same in both; left and right are told apart by the colour-blind as well."""
+"""Colours of pictures and films; the colour-blind can tell left from right too."""
 
 from __future__ import annotations
 

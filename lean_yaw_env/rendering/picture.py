@@ -1,8 +1,7 @@
-"""Pictures for paper and page: the walker with its parameters, and footprints of several walks side by side."""
+"""Footprints of several walks side by side, for paper and page."""
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
@@ -39,13 +38,14 @@ class WalkRecord(Protocol):
 def draw_footprints(
     walks: Mapping[str, WalkRecord], axes: Sequence[Axes], *, foot_radius: float = 0.5
 ) -> None:
-    """Draw footprints and the centre of mass's path from above, one walk to an axes, all to one scale; downhill is up.
+    """Draw footprints and the centre of mass's path from above, one walk to an axes, all to one
+    scale; downhill is up.
 
     Parameters
     ----------
     walks : mapping of names to walks
-        With ``footprints`` (n, 2), ``headings`` (n,), ``stances`` (n) and ``path`` (m, 4) (time, downhill, up, right) as ``Walk`` has them; the
-        path may be empty.
+        With ``footprints`` (n, 2), ``headings`` (n,), ``stances`` (n) and ``path`` (m, 4) (time,
+        downhill, up, right) as ``Walk`` has them; the path may be empty.
     axes : one for each walk
     foot_radius : [0, 1)
         Gives the prints' length.
@@ -99,7 +99,7 @@ def save_footprints(
 
 
 def new_figure(width: float, height: float) -> Any:
-    """A matplotlib figure of this size in inches that needs no display and leaves no global state."""
+    """A matplotlib figure, in inches, that needs no display and leaves no global state."""
     require_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -125,7 +125,9 @@ def _draw_walk(axes: Axes, walk: WalkRecord, length: float) -> None:
     colours = [unit_colour(FOOT_COLOURS[foot]) for foot in walk.stances]
     # an edge of its own colour keeps prints visible where they are smaller than a dot
     axes.add_collection(
-        PolyCollection(list(outlines[:, :, ::-1]), facecolors=colours, edgecolors=colours, linewidths=0.4)
+        PolyCollection(
+            list(outlines[:, :, ::-1]), facecolors=colours, edgecolors=colours, linewidths=0.4
+        )
     )
     if len(walk.path):
         axes.plot(walk.path[:, 3], walk.path[:, 1], color=unit_colour(INK), linewidth=0.7)

@@ -49,7 +49,7 @@ class Renderer:
         self._closed_by_user = False
 
     def frame(self, scene: Scene) -> NDArray[np.uint8]:
-        """The picture of a scene; shape (height, width, 3), uint8. Needs no display and opens none."""
+        """The picture of a scene; shape (height, width, 3), uint8. Needs and opens no display."""
         self._draw(scene)
         return self._canvas.array()
 
@@ -59,7 +59,8 @@ class Renderer:
         Returns
         -------
         bool
-            False once the window has been closed by its user; it stays closed, and nothing more is drawn.
+            False once the window has been closed by its user; it stays closed, and nothing more is
+            drawn.
 
         Raises
         ------
@@ -69,10 +70,9 @@ class Renderer:
         rate = require_number("fps", fps, 0.0, 1000.0, "(]")
         if self._closed_by_user:
             return False
-        if self._window is None:
-            self._open()
+        window = self._opened_window()
         self._draw(scene)
-        self._window.blit(self._canvas.surface(), (0, 0))
+        window.blit(self._canvas.surface(), (0, 0))
         self._pygame.display.flip()
         self._clock.tick(rate)
         for event in self._pygame.event.get():
@@ -88,16 +88,18 @@ class Renderer:
             self._window = None
             self._pygame.display.quit()
 
-    def _open(self) -> None:
-        try:
-            self._pygame.display.init()
-            self._window = self._pygame.display.set_mode(self.size)
-        except self._pygame.error as error:
-            raise RuntimeError(
-                f"no window could be opened ({error}); without a display, ask for arrays instead"
-            ) from error
-        self._pygame.display.set_caption("Lean-to-yaw walker")
-        self._clock = self._pygame.time.Clock()
+    def _opened_window(self) -> Any:
+        if self._window is None:
+            try:
+                self._pygame.display.init()
+                self._window = self._pygame.display.set_mode(self.size)
+            except self._pygame.error as error:
+                raise RuntimeError(
+                    f"no window could be opened ({error}); without a display, ask for arrays"
+                ) from error
+            self._pygame.display.set_caption("Lean-to-yaw walker")
+            self._clock = self._pygame.time.Clock()
+        return self._window
 
     def _draw(self, scene: Scene) -> None:
         top, side, rear = _panels(self.size)

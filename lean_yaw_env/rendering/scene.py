@@ -35,7 +35,8 @@ class Scene:
     pose : Pose
         The walker now.
     footprints : shape (n, 2)
-        Contact reference points so far, (downhill, right), in leg lengths; the last is the stance foot's.
+        Contact reference points so far, (downhill, right), in leg lengths; the last is the stance
+        foot's.
     headings : shape (n,)
         Of each footprint, rad.
     feet : n of "left" or "right"
@@ -52,7 +53,8 @@ class Scene:
     Raises
     ------
     ValueError
-        If an array has another shape or holds what is not a finite number, or a foot or goal is none.
+        If an array has another shape or holds what is not a finite number, or a foot or goal is
+        none.
     """
 
     parameters: WalkerParameters
@@ -75,7 +77,9 @@ class Scene:
         headings = require_finite("headings", self.headings, (len(footprints),))
         feet = tuple(require_foot(foot) for foot in self.feet)
         if len(feet) != len(footprints):
-            raise ValueError(f"feet must hold {len(footprints)}, one per footprint, not {len(feet)}")
+            raise ValueError(
+                f"feet must hold {len(footprints)}, one per footprint, not {len(feet)}"
+            )
         object.__setattr__(self, "footprints", footprints)
         object.__setattr__(self, "headings", headings)
         object.__setattr__(self, "feet", feet)
@@ -91,7 +95,10 @@ class Scene:
 
     @property
     def heading(self) -> float:
-        """Mean heading of the last two footprints, for left and right alternate; the stance foot's if there are not two."""
+        """Mean heading of the last two footprints, for left and right alternate, rad.
+
+        The stance foot's if there are not two.
+        """
         if len(self.headings) < 2:
             return float(self.pose.state[0])
         return float(self.headings[-2:].mean())
@@ -106,7 +113,7 @@ def status_lines(
     commanded_heading: float | None = None,
     status: str = "walking",
 ) -> tuple[str, ...]:
-    """The usual words beside the picture of a walk, the same from a film and from an environment."""
+    """The usual words beside a walk's picture, the same from a film and an environment."""
     lines = [f"step {step}", f"time {time:.1f}"]
     if speed is not None:
         lines.append(f"speed {speed:.3f}")
@@ -121,7 +128,9 @@ def _require_goal(goal: Goal) -> Goal:
     try:
         downhill, right, radius, reached = goal
     except (TypeError, ValueError) as error:
-        raise ValueError(f"a goal must be (downhill, right, radius, reached), not {goal!r}") from error
+        raise ValueError(
+            f"a goal must be (downhill, right, radius, reached), not {goal!r}"
+        ) from error
     return Goal(
         require_number("goal's downhill", downhill, -1e6, 1e6),
         require_number("goal's right", right, -1e6, 1e6),

@@ -1,4 +1,4 @@
-"""The walk from above: footprints, the centre of mass's path, where the walker heads and where it should."""
+"""The walk from above: footprints, path, where the walker heads and where it should."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.rendering.camera import FloorCamera, Panel, floor_camera
 from lean_yaw_env.rendering.canvas import Canvas
-from lean_yaw_env.rendering.footprints import footprint_length, footprint_outlines
+from lean_yaw_env.rendering.footprints import CORNERS_PER_KNOT, footprint_length, footprint_outlines
 from lean_yaw_env.rendering.geometry import WalkerShape
 from lean_yaw_env.rendering.palette import (
     COMMAND,
@@ -29,11 +29,13 @@ from lean_yaw_env.rendering.scene import Scene
 BORDER = 64.0
 """Pixels between what must be seen and the panel's edge; the arrows have their place there."""
 GREATEST_SCALE, LEAST_SCALE = 130.0, 22.0
-"""Pixels per leg length: about a dozen steps in the panel at first, about 65 at last; a longer walk is followed, and seen whole in an inset."""
-_LEAST_GRID = 22.0  # pixels between grid lines
+"""Pixels per leg length: a dozen steps in the panel at first, 65 at last.
+
+A longer walk is followed, and seen whole in an inset.
+"""
 _MOST_PATH_POINTS = 1500
-_FULL_OUTLINE = 16.0  # a print longer than this, in pixels, shows all its corners
-_COARSE_CORNERS = (0, 3, 6, 9, 11, 13, 15)
+_FULL_OUTLINE = 16.0  # a print shorter than this, in pixels, needs fewer corners
+_COARSE = 2 * CORNERS_PER_KNOT
 _OLD_PRINT = 0.4  # how much prints behind the walker have faded
 
 
@@ -43,13 +45,13 @@ def draw_top_view(canvas: Canvas, panel: Panel, scene: Scene, shape: WalkerShape
     camera = _camera(panel, scene, walker)
     canvas.clip(panel)
     canvas.rectangle(panel, FLOOR)
-    spacing = _draw_grid(canvas, camera)
+    _draw_grid(canvas, camera)
     _draw_tasks(canvas, camera, scene)
     _draw_footprints(canvas, camera, scene)
     _draw_path(canvas, camera, np.vstack([scene.path, walker]))
     _draw_walker(canvas, camera, scene, shape)
     _draw_arrows(canvas, camera, scene, walker)
-    _draw_scale(canvas, camera, spacing)
+    _draw_scale(canvas, camera)
     _draw_downhill(canvas, camera, scene)
     _draw_words(canvas, panel, scene)
     if not camera.sees(scene.path).all():
@@ -69,19 +71,16 @@ def _camera(panel: Panel, scene: Scene, walker: Vector) -> FloorCamera:
     )
 
 
-def _draw_grid(canvas: Canvas, camera: FloorCamera) -> int:
-    """Draw lines every few leg lengths, every fifth one stronger; returns their spacing in leg lengths."""
-    spacing = next(n for n in (1, 2, 5, 10, 20, 50) if n * camera.scale >= _LEAST_GRID or n == 50)
+def _draw_grid(canvas: Canvas, camera: FloorCamera) -> None:
+    """Draw a line every leg length, every fifth one stronger and over the others."""
     low, high = camera.centre - camera.reach, camera.centre + camera.reach
-    for axis in (0, 1):
-        first, last = math.ceil(low[axis] / spacing), math.floor(high[axis] / spacing)
-        for weak in (True, False):
-            for line in range(first, last + 1):
+    for weak in (True, False):
+        for axis in (0, 1):
+            for line in range(math.ceil(low[axis]), math.floor(high[axis]) + 1):
                 if (line % 5 != 0) == weak:
                     ends = np.array([low, high])
-                    ends[:, axis] = line * spacing
+                    ends[:, axis] = line
                     canvas.lines(camera.pixels(ends), GRID if weak else STRONG_GRID, 1.0)
-    return spacing
 
 
 def _draw_tasks(canvas: Canvas, camera: FloorCamera, scene: Scene) -> None:
@@ -96,13 +95,13 @@ def _draw_tasks(canvas: Canvas, camera: FloorCamera, scene: Scene) -> None:
 
 def _draw_footprints(canvas: Canvas, camera: FloorCamera, scene: Scene) -> None:
     length = footprint_length(scene.parameters.foot_radius)
-    seen = np.flatnonzero(camera.sees(scene.footprints, length))
+    seen = np.flatnonzero(camera.sees(scene.footprints, length)).tolist()
     feet = [scene.feet[i] for i in seen]
     outlines = camera.pixels(
         footprint_outlines(scene.footprints[seen], scene.headings[seen], feet, length)
     )
     if camera.scale * length < _FULL_OUTLINE:
-        outlines = outlines[:, _COARSE_CORNERS]
+        outlines = outlines[:, ::_COARSE]
     old = {foot: mixed(colour, FLOOR, _OLD_PRINT) for foot, colour in FOOT_COLOURS.items()}
     newest = len(scene.footprints) - 1
     for i, foot, outline in zip(seen, feet, outlines, strict=True):
@@ -114,9 +113,7 @@ def _draw_path(canvas: Canvas, camera: FloorCamera, path: Vector) -> None:
     points = _thinned(path)
     seen = camera.sees(points, margin=0.1 * float(camera.reach.max()))
     changes = np.flatnonzero(np.diff(seen)) + 1
-    for piece, is_seen in zip(
-        np.split(points, changes), seen[np.append(0, changes)], strict=True
-    ):
+    for piece, is_seen in zip(np.split(points, changes), seen[np.append(0, changes)], strict=True):
         if is_seen:
             canvas.lines(camera.pixels(piece), PATH, 1.25)
 
@@ -127,7 +124,9 @@ def _draw_walker(canvas: Canvas, camera: FloorCamera, scene: Scene, shape: Walke
     length = footprint_length(scene.parameters.foot_radius)
     # the print it would leave were it set down as it is: around where its sole is at zero pitch
     ahead = scene.parameters.foot_radius * leg.pitch
-    reference = leg.centre[[0, 2]] + ahead * np.array([math.cos(leg.heading), -math.sin(leg.heading)])
+    reference = leg.centre[[0, 2]] + ahead * np.array(
+        [math.cos(leg.heading), -math.sin(leg.heading)]
+    )
     outline = footprint_outlines(reference[None], np.array([leg.heading]), [leg.foot], length)[0]
     canvas.polygon(camera.pixels(outline), None, FOOT_COLOURS[leg.foot], 1.0)
     hips = camera.pixels(np.array([shape.stance_leg.hip, leg.hip, *shape.masses])[:, [0, 2]])
@@ -150,15 +149,15 @@ def _on_picture(heading: float) -> Vector:
     return np.array([-math.sin(heading), -math.cos(heading)])
 
 
-def _draw_scale(canvas: Canvas, camera: FloorCamera, spacing: int) -> None:
+def _draw_scale(canvas: Canvas, camera: FloorCamera) -> None:
     panel = camera.panel
     end = np.array([panel.right - 16.0, panel.bottom - 16.0])
-    start = end - np.array([spacing * camera.scale, 0.0])
+    start = end - np.array([camera.scale, 0.0])
     canvas.bar(start, end, INK, 1.5)
     for tick in (start, end):
         canvas.bar(tick - np.array([0.0, 4.0]), tick + np.array([0.0, 4.0]), INK, 1.5)
-    words = "1 leg length" if spacing == 1 else f"{spacing} leg lengths"
-    canvas.text(words, (end[0], end[1] - 8.0), INK, anchor=(1.0, 1.0), ground=FLOOR)
+    place = (end[0], end[1] - 8.0)
+    canvas.text("1 leg length", place, INK, anchor=(1.0, 1.0), ground=FLOOR)
 
 
 def _draw_downhill(canvas: Canvas, camera: FloorCamera, scene: Scene) -> None:
@@ -175,7 +174,9 @@ def _draw_downhill(canvas: Canvas, camera: FloorCamera, scene: Scene) -> None:
         length = np.array([0.0, -26.0])
         ends = (tail, tail + length) if slope > 0.0 else (tail + length, tail)
         canvas.arrow(*ends, FAINT_INK, 2.0)
-    canvas.text(words, (panel.left + 34.0, panel.bottom - 16.0), FAINT_INK, anchor=(0.0, 1.0), ground=FLOOR)
+    canvas.text(
+        words, (panel.left + 34.0, panel.bottom - 16.0), FAINT_INK, anchor=(0.0, 1.0), ground=FLOOR
+    )
 
 
 def _draw_words(canvas: Canvas, panel: Panel, scene: Scene) -> None:
@@ -184,7 +185,10 @@ def _draw_words(canvas: Canvas, panel: Panel, scene: Scene) -> None:
 
 
 def _draw_inset(canvas: Canvas, camera: FloorCamera, scene: Scene, walker: Vector) -> None:
-    """The whole path, small, when the panel cannot show it: in the lower right corner, or in the upper one if the walker is down there."""
+    """The whole path, small, when the panel cannot show it.
+
+    In the lower right corner, or in the upper one if the walker is down there.
+    """
     size = 110.0
     place = camera.pixels(walker) - camera.panel.middle
     top = camera.panel.top + 14.0 if (place > 0.0).all() else camera.panel.bottom - size - 48.0
