@@ -244,7 +244,8 @@ class Walker:
         commands = [require_command(a, m, None) for a, m in zip(angles, offsets, strict=True)]
         before = require_command(angles[0], offsets[0], previous_offset).offset_before
 
-        states, stances, footprints = [current], [foot], [np.zeros(2)]
+        states, footprints = [current], [np.zeros(2)]
+        stances: list[Foot] = [foot]
         durations: list[float] = []
         in_force, energies, path = [before], [], []
         fall = None
