@@ -1,7 +1,7 @@
 """Pictures and films of walks; drawing libraries are imported when something is drawn."""
 
 from lean_yaw_env.rendering.diagram import draw_walker
-from lean_yaw_env.rendering.film import film
+from lean_yaw_env.rendering.filming import film
 from lean_yaw_env.rendering.geometry import LegShape, Pose, WalkerShape, walker_shape
 from lean_yaw_env.rendering.picture import draw_footprints, save_footprints
 from lean_yaw_env.rendering.pygame_renderer import Renderer

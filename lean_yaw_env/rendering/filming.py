@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -16,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector, require_number
 from lean_yaw_env.rendering.files import require_ending, written_whole
 from lean_yaw_env.rendering.geometry import Pose
-from lean_yaw_env.rendering.optional import require_ffmpeg, require_pillow
+from lean_yaw_env.rendering.optional import require_ffmpeg, require_pillow, require_tqdm
 from lean_yaw_env.rendering.pygame_renderer import SIZE, Renderer
 from lean_yaw_env.rendering.scene import Scene, status_lines
 from lean_yaw_env.walker import Walk, Walker
@@ -107,6 +106,7 @@ def film(
     require_number("swing_share", swing_share, 0.0, 1.0)
     is_gif = place.suffix.lower() == ".gif"
     write, rate = (_gif_writer(), _gif_rate(fps)) if is_gif else (_mp4_writer(), float(fps))
+    progress_bar = require_tqdm().tqdm if progress else None
     renderer = Renderer(size)
     walk = walker.walk(
         n_steps,
@@ -121,10 +121,8 @@ def film(
     hold = round(HOLD_SECONDS * rate) if walk.fall else 0
     scenes = (_scene(walker, recording, time, swing_share) for time in times)
     frames = _with_last_repeated((renderer.frame(scene) for scene in scenes), hold)
-    if progress:
-        frames = importlib.import_module("tqdm").tqdm(
-            frames, total=len(times) + hold, desc=place.name, unit="frame"
-        )
+    if progress_bar is not None:
+        frames = progress_bar(frames, total=len(times) + hold, desc=place.name, unit="frame")
     with written_whole(place) as temporary:
         write(temporary, frames, rate, renderer.size)
     return walk
