@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import warnings
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -22,22 +23,27 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 inlined = njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
 
 
-def _sources_digest() -> str:
-    """A digest of every kernel source file: what an entry point's machine code depends on."""
+_KERNEL = Path(__file__).parent
+
+
+@lru_cache
+def _sources_digest(folder: Path) -> str:
+    """A digest of the sources an entry point in that folder is made from: the kernel's, the folder's, and those between it and the package."""
+    folders = [_KERNEL]
+    while folder not in (_KERNEL, _KERNEL.parent, folder.parent):
+        folders.append(folder)
+        folder = folder.parent
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    for path in sorted(path for each in folders for path in each.glob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
-
-
-_SOURCES = _sources_digest()
 
 
 def entry_point(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function that Python calls, releasing the GIL, and keep its machine code on disk.
 
     Numba renews its cache when the entry point's own file changes, but not when a formula inlined from another file does. The digest
-    of all kernel sources takes the place of that file's time stamp, which also serves file systems without stable times.
+    of all sources that may be inlined takes the place of that file's time stamp, which also serves file systems without stable times.
     Where no cache folder can be written, the function is compiled in every process and a warning says so once.
     """
 
@@ -50,7 +56,8 @@ def entry_point(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         except RuntimeError:
             _warn_uncached()
         else:
-            dispatcher._cache._cache_file._source_stamp = _SOURCES
+            folder = Path(function.__code__.co_filename).parent
+            dispatcher._cache._cache_file._source_stamp = _sources_digest(folder)
         return dispatcher
 
     return decorate
