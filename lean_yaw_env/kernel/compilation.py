@@ -29,10 +29,8 @@ _KERNEL = Path(__file__).parent
 @lru_cache
 def _sources_digest(folder: Path) -> str:
     """A digest of the sources an entry point in that folder is made from: the kernel's, the folder's, and those between it and the package."""
-    folders = [_KERNEL]
-    while folder not in (_KERNEL, _KERNEL.parent, folder.parent):
-        folders.append(folder)
-        folder = folder.parent
+    between = {parent for parent in folder.parents if _KERNEL.parent in parent.parents}
+    folders = {_KERNEL, folder} | between
     digest = hashlib.sha256()
     for path in sorted(path for each in folders for path in each.glob("*.py")):
         digest.update(path.read_bytes())
