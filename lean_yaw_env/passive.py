@@ -160,7 +160,7 @@ class PassiveWalker:
         The locked motion is that of the free walker without hip width, started without lean.
     """
 
-    parameters: WalkerParameters = WalkerParameters(slope=0.004)
+    parameters: WalkerParameters
     planar: bool = False
 
     def __post_init__(self) -> None:
@@ -215,8 +215,8 @@ class PassiveWalker:
         require_number("n_steps", n_steps, 1, 10_000_000)
         result = None
         current, foot = require_passive_state(state, planar=self.planar), require_foot(stance)
-        states, stances, angles = [current], [foot], []
-        footprints, durations = [np.zeros(2)], []
+        states, angles, footprints, durations = [current], [], [np.zeros(2)], []
+        stances: list[Foot] = [foot]
         angle: float | None = None
         for _ in range(int(n_steps)):
             result = self.step(current, stance=foot, inter_leg_angle=angle)

@@ -1,4 +1,4 @@
-"""Limit cycles of the active walker: fixed points of the stride map, found by a root finder with the exact Jacobian.
+"""Limit cycles of the walkers: fixed points of section maps, with their multipliers.
 
 Iterating strides finds no gait in practice: Table 1's converges by 0.986 a stride.
 """
@@ -6,44 +6,69 @@ Iterating strides finds no gait in practice: Table 1's converges by 0.986 a stri
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import root
 
-from lean_yaw_env.analysis.stride import stride_jacobian, stride_map
-from lean_yaw_env.errors import LeanYawError, NoGaitError
-from lean_yaw_env.parameters import (
-    INTER_LEG_ANGLE,
-    Vector,
-    require_inter_leg_angle,
-    require_mass_offset,
+from lean_yaw_env.analysis.fixed_point import (
+    RESIDUAL_LIMIT,
+    follow_fixed_point,
+    solve_fixed_point,
 )
-from lean_yaw_env.walker import Walker
+from lean_yaw_env.analysis.passive_search import search_passive
+from lean_yaw_env.analysis.section_map import ActiveMap, PassiveMap, section_map_of
+from lean_yaw_env.errors import NoGaitError
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector
+from lean_yaw_env.passive import PassiveStep, PassiveWalker
+from lean_yaw_env.walker import StepResult, Walker
 
-RESIDUAL_LIMIT = 1e-12
-"""Largest change of any coordinate over a stride that still counts as a fixed point."""
-_SMALLEST_PIECE = 1.0 / 256.0
+__all__ = [
+    "RESIDUAL_LIMIT",
+    "LimitCycle",
+    "cycle_at",
+    "find_gait",
+    "find_limit_cycle",
+    "find_passive_gaits",
+    "planar_gait_rate",
+]
+
+_HELPING_SLOPES = (0.01, 0.02)
+"""Where to start from a gait that a slope drives, on the way to one that pumping drives."""
 
 
 @dataclass(frozen=True)
 class LimitCycle:
-    """A periodic gait of two steps.
+    """A periodic gait.
 
     Attributes
     ----------
-    state : shape (5,)
+    state : shape (5,), or (6,) of a passive walker
         Section state on the left foot.
-    eigenvalues : shape (5,), complex
-        Of the stride map's Jacobian (the Floquet multipliers), by falling magnitude; all below one is stable. On a slope that turns with
-        the walker the heading is free, its multiplier of one is left out, and the shape is (4,).
-    stride_period, speed, step_length : float
-        Duration of two steps; path length between footprints' stride chord divided by it; half of that chord.
+    eigenvalues : shape (n,), complex
+        Of the cycle's Jacobian (the Floquet multipliers), by falling magnitude; all below one is
+        stable. Where every heading is like any other (on the level, on a slope that turns with
+        the walker) the heading's multiplier of one is left out; a planar walker has three.
+    stride_period : float
+        Duration of two steps.
+    speed : float
+        Distance from a footprint to the same foot's next one, by the time between.
+    step_length : float
+        Half of that distance.
     turn : float
-        Heading gained per stride, rad: zero but on a slope that turns with the walker.
+        Heading gained per cycle, rad: zero but where every heading is like any other.
     residual : float
-        Largest change of any coordinate over the stride (not counting ``turn``).
+        Largest change of any coordinate over the cycle (not counting ``turn``).
+    n_steps : int
+        Steps until the state recurs: 1 if a right step mirrors a left one, 2, or 4 and more past
+        a period doubling. Means are over the cycle.
+    jacobian : shape (n, n)
+        Of the cycle (of two steps if ``n_steps`` is 1) in ``coordinates``.
+    coordinates : names of the section's coordinates that the gait repeats
+    gravity_work, shift_work : float
+        Per distance, in weights: what gravity gives, and what moving the masses puts in.
+    normal_force, friction_demand : float
+        Least normal force (in weights) and greatest tangential over normal force.
     """
 
     state: Vector
@@ -53,6 +78,13 @@ class LimitCycle:
     step_length: float
     turn: float
     residual: float
+    n_steps: int
+    jacobian: Vector
+    coordinates: tuple[str, ...]
+    gravity_work: float
+    shift_work: float
+    normal_force: float
+    friction_demand: float
 
     @property
     def is_stable(self) -> bool:
@@ -61,10 +93,11 @@ class LimitCycle:
 
 
 def planar_gait_rate(walker: Walker, inter_leg_angle: float, heading: float = 0.0) -> float:
-    """Stance pitch rate just after heel strike of the planar active walker (no hip width), in closed form.
+    """Stance pitch rate just after heel strike of the planar active walker, in closed form.
 
-    One step multiplies the squared rate by k^2, k the planar impact's ratio, after gravity has added the slope's work. Returns nan where the slope
-    gives no energy, or no impact takes any.
+    Without hip width, one step multiplies the squared rate by k^2, k the planar impact's ratio,
+    after gravity has added the slope's work. Returns nan where the slope gives no energy, or no
+    impact takes any.
     """
     r, slope = walker.parameters.foot_radius, walker.parameters.slope
     half = 0.5 * inter_leg_angle
@@ -80,16 +113,24 @@ def planar_gait_rate(walker: Walker, inter_leg_angle: float, heading: float = 0.
 
 
 def find_limit_cycle(
-    walker: Walker, *, inter_leg_angle: float = INTER_LEG_ANGLE, mass_offset: float = 0.0
+    walker: Walker | PassiveWalker,
+    *,
+    inter_leg_angle: float = INTER_LEG_ANGLE,
+    mass_offset: float | tuple[float, float] = 0.0,
 ) -> LimitCycle:
-    """Find the gait at a constant command, with its multipliers.
+    """Find a walker's gait at a constant command, with its multipliers.
 
     Parameters
     ----------
-    walker : Walker
+    walker : Walker or PassiveWalker
+        Of a passive walker's gaits, the one with the longest period, which alone can be stable.
     inter_leg_angle : (0, pi/2)
-    mass_offset : [-1, 1]
-        An offset that the slope can balance, sin(heading) = -offset / tan(slope), gives a gait across the slope.
+        Of the active walker only.
+    mass_offset : [-1, 1], or a pair of them
+        Of the active walker only. One number: an offset that the slope can balance, sin(heading) =
+        -offset / tan(slope), gives a gait across the slope. A pair: the offset while the left and
+        while the right foot stands; (a, -a) with positive a, away from the stance foot, is pumping,
+        which can drive the walker on the level and uphill.
 
     Raises
     ------
@@ -98,24 +139,12 @@ def find_limit_cycle(
     ValueError
         If an argument is outside its range.
     """
-    command = _Command(require_inter_leg_angle(inter_leg_angle), require_mass_offset(mass_offset))
-    state = _search(walker, command, exact=True)
-    first, second = stride_map(walker, state, **command.keywords)
-    jacobian = stride_jacobian(walker, state, **command.keywords).matrix
-    free = _free_coordinates(walker)
-    eigenvalues = np.linalg.eigvals(jacobian[np.ix_(free, free)]).astype(complex)
-    period = first.duration + second.duration
-    stride = float(np.linalg.norm(first.displacement + second.displacement))
-    change = second.state - state
-    return LimitCycle(
-        state=state,
-        eigenvalues=eigenvalues[np.lexsort((-eigenvalues.imag, -np.abs(eigenvalues)))],
-        stride_period=period,
-        speed=stride / period,
-        step_length=0.5 * stride,
-        turn=float(change[0]) if walker.parameters.slope_turns else 0.0,
-        residual=float(np.abs(change[free]).max()),
-    )
+    if isinstance(walker, PassiveWalker):
+        section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
+        return find_passive_gaits(walker)[0]
+    section_map = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
+    assert isinstance(section_map, ActiveMap)
+    return cycle_at(section_map, _search(section_map, exact=True))
 
 
 def find_gait(
@@ -130,120 +159,154 @@ def find_gait(
     NoGaitError, ValueError
         As ``find_limit_cycle``.
     """
-    command = _Command(require_inter_leg_angle(inter_leg_angle), require_mass_offset(mass_offset))
-    return _search(walker, command, exact=False)
+    section_map = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
+    if not isinstance(section_map, ActiveMap):
+        raise ValueError(f"walker must be a Walker, not {walker!r}")
+    return _search(section_map, exact=False)
 
 
-@dataclass(frozen=True)
-class _Command:
-    inter_leg_angle: float
-    mass_offset: float
+def find_passive_gaits(walker: PassiveWalker) -> tuple[LimitCycle, ...]:
+    """Find a passive walker's symmetric gaits, that of the longest period first.
 
-    @property
-    def keywords(self) -> dict[str, float]:
-        return {"inter_leg_angle": self.inter_leg_angle, "mass_offset": self.mass_offset}
+    Without hip width they are the planar walker's, found from many starts around the scaling law
+    stance pitch ~ (slope / (1 - radius)^2)^(1/3); with hip width these are followed from none.
+
+    Raises
+    ------
+    NoGaitError
+        If there is none; says what was tried.
+    """
+    if not isinstance(walker, PassiveWalker):
+        raise ValueError(f"walker must be a PassiveWalker, not {walker!r}")
+    cycles = [cycle_at(PassiveMap(walker), state) for state in search_passive(walker)]
+    return tuple(sorted(cycles, key=lambda cycle: -cycle.stride_period))
 
 
-def _free_coordinates(walker: Walker) -> slice | list[int]:
-    """Coordinates that a gait repeats: all, but for the heading where the slope turns with the walker."""
-    return [1, 2, 3, 4] if walker.parameters.slope_turns else [0, 1, 2, 3, 4]
+def cycle_at(section_map: ActiveMap | PassiveMap, state: Vector) -> LimitCycle:
+    """Describe the gait at a fixed point of a section map.
 
-
-def _search(walker: Walker, command: _Command, exact: bool) -> Vector:
-    """Solve from the planar gait's closed form; failing that, follow the gait from no hip width and no offset."""
-    tried: list[str] = []
-    guess = _planar_guess(walker, command)
-    if guess is not None:
-        found = _solve(walker, command, guess, exact, tried, "the planar gait")
-        if found is not None:
-            return found
-        found = _follow(walker, command, exact, tried)
-        if found is not None:
-            return found
-    else:
-        tried.append("the planar gait has no closed form here: the slope gives no energy along any heading that balances the offset")
-    raise NoGaitError(
-        f"no gait found for {walker.parameters} with inter-leg angle {command.inter_leg_angle:g} and "
-        f"mass offset {command.mass_offset:g}; tried: " + "; ".join(tried)
+    Parameters
+    ----------
+    section_map : ActiveMap or PassiveMap
+    state : shape (5,) or (6,)
+        Its fixed point, as from ``solve_fixed_point``.
+    """
+    n_steps = section_map.n_steps
+    cycle = section_map.over(2 * n_steps) if n_steps % 2 else section_map
+    results = cycle.results(state)
+    free = cycle.free
+    _, matrix = cycle.derivative(state)
+    jacobian = matrix[np.ix_(free, free)]
+    eigenvalues = np.asarray(np.linalg.eigvals(jacobian), dtype=complex)
+    duration = sum(result.duration for result in results)
+    # Chords between the same foot's prints: along a turn they are what is walked
+    chord = sum(
+        float(np.linalg.norm(first.displacement + second.displacement))
+        for first, second in zip(results[::2], results[1::2], strict=True)
+    )
+    change = results[-1].state - state
+    gravity, shift = np.sum([_works(result) for result in results], axis=0).tolist()
+    return LimitCycle(
+        state=state,
+        eigenvalues=eigenvalues[np.lexsort((-np.imag(eigenvalues), -np.abs(eigenvalues)))],
+        stride_period=2.0 * duration / len(results),
+        speed=chord / duration,
+        step_length=chord / len(results),
+        turn=0.0 if 0 in free or cycle.n_steps % 2 else float(change[0]),
+        residual=float(np.abs(change[free]).max()),
+        n_steps=n_steps,
+        jacobian=jacobian,
+        coordinates=tuple(cycle.names[i] for i in free),
+        gravity_work=gravity / chord,
+        shift_work=shift / chord,
+        normal_force=min(result.normal_force for result in results),
+        friction_demand=max(result.friction_demand for result in results),
     )
 
 
-def _planar_guess(walker: Walker, command: _Command) -> Vector | None:
-    heading = 0.0
-    if command.mass_offset != 0.0 and not walker.parameters.slope_turns:
-        sine = -command.mass_offset / math.tan(walker.parameters.slope or math.inf)
-        if abs(sine) >= 1.0:
+def _works(result: StepResult | PassiveStep) -> tuple[float, float]:
+    """Gravity's and the shift's work of a step."""
+    if isinstance(result, StepResult):
+        return result.energy.gravity_work, result.energy.shift_work
+    return result.gravity_work, 0.0
+
+
+def _search(section_map: ActiveMap, exact: bool) -> Vector:
+    """Solve from the planar gait's closed form; failing that, follow a gait from a simpler one."""
+    tried: list[str] = []
+    guess = _planar_guess(section_map)
+    if guess is None:
+        tried.append(
+            "the planar gait has no closed form here: the slope gives no energy along any heading "
+            "that balances the offset"
+        )
+    else:
+        try:
+            return solve_fixed_point(section_map, guess, exact=exact)
+        except NoGaitError as error:
+            tried.append(f"from the planar gait: {error}")
+        try:
+            return _widened(section_map, exact)
+        except NoGaitError as error:
+            tried.append(f"following the gait from no hip width and no offset: {error}")
+    if section_map.value("alternating_offset") != 0.0:
+        for slope in _HELPING_SLOPES:
+            try:
+                return _pumped(section_map, slope, exact)
+            except NoGaitError as error:
+                tried.append(f"following the gait from slope {slope:g} without pumping: {error}")
+    raise NoGaitError(
+        f"no gait found for {section_map.walker.parameters} with inter-leg angle "
+        f"{section_map.inter_leg_angle:g} and mass offset {_shown(section_map.mass_offset)}; "
+        "tried: " + "; ".join(tried)
+    )
+
+
+def _shown(offsets: tuple[float, float]) -> str:
+    left, right = offsets
+    return f"{left:g}" if left == right else f"({left:g}, {right:g})"
+
+
+def _planar_guess(section_map: ActiveMap) -> Vector | None:
+    heading, offset = 0.0, section_map.value("mass_offset")
+    parameters = section_map.walker.parameters
+    if offset != 0.0 and not parameters.slope_turns:
+        sine = -offset / math.tan(parameters.slope or math.inf)
+        if not abs(sine) < 1.0:
             return None
         heading = math.asin(sine)
-    rate = planar_gait_rate(walker, command.inter_leg_angle, heading)
+    rate = planar_gait_rate(section_map.walker, section_map.inter_leg_angle, heading)
     if math.isnan(rate):
         return None
-    return np.array([heading, 0.5 * command.inter_leg_angle, 0.0, rate, 0.0])
+    return np.array([heading, 0.5 * section_map.inter_leg_angle, 0.0, rate, 0.0])
 
 
-def _follow(walker: Walker, command: _Command, exact: bool, tried: list[str]) -> Vector | None:
-    """Raise hip width and offset together from zero, in pieces that shrink where the solver fails."""
+def _widened(section_map: ActiveMap, exact: bool) -> Vector:
+    """Raise hip width and offsets together from zero."""
+    width = section_map.value("hip_width")
+    left, right = section_map.mass_offset
 
-    def at(fraction: float) -> tuple[Walker, _Command]:
-        width = fraction * walker.parameters.hip_width
-        return (
-            Walker(replace(walker.parameters, hip_width=width)),
-            replace(command, mass_offset=fraction * command.mass_offset),
+    def path(share: float) -> ActiveMap:
+        moved = section_map.moved("hip_width", share * width)
+        return ActiveMap(
+            moved.walker, moved.inter_leg_angle, (share * left, share * right), moved.n_steps
         )
 
-    start = _planar_guess(*at(0.0))
+    start = _planar_guess(path(0.0))
     if start is None:
-        return None
-    reached, piece, state = 0.0, 0.25, start
-    previous: tuple[float, Vector] | None = None
-    while reached < 1.0:
-        target = min(1.0, reached + piece)
-        guess = state
-        if previous is not None:
-            share = (target - reached) / (reached - previous[0])
-            guess = state + share * (state - previous[1])
-        found = _solve(*at(target), guess, exact, [], "")
-        if found is None:
-            piece *= 0.5
-            if piece < _SMALLEST_PIECE:
-                tried.append(
-                    f"following the gait from no hip width and no offset, which ended at {reached:.3f} of both"
-                )
-                return None
-            continue
-        previous, reached, state = (reached, state), target, found
-        piece *= 1.5
-    return state
+        raise NoGaitError("the slope gives no energy")
+    return follow_fixed_point(path, start, exact=exact)[1]
 
 
-def _solve(
-    walker: Walker, command: _Command, guess: Vector, exact: bool, tried: list[str], name: str
-) -> Vector | None:
-    """A fixed point near ``guess``, or None after noting in ``tried`` how it failed."""
-    free = _free_coordinates(walker)
+def _pumped(section_map: ActiveMap, slope: float, exact: bool) -> Vector:
+    """From a slope that drives the gait alone: raise the offsets from zero as the slope levels."""
+    left, right = section_map.mass_offset
+    target = section_map.value("slope")
 
-    def full(x: Vector) -> Vector:
-        state = guess.copy()
-        state[free] = x
-        return state
-
-    def change(x: Vector) -> Vector:
-        _, second = stride_map(walker, full(x), **command.keywords)
-        return (second.state - full(x))[free]
-
-    def slope(x: Vector) -> Vector:
-        matrix = stride_jacobian(walker, full(x), **command.keywords).matrix
-        return matrix[np.ix_(free, free)] - np.eye(len(free))
-
-    try:
-        solution = root(
-            change, guess[free], jac=slope if exact else None, options={"xtol": 1e-15}
+    def path(share: float) -> ActiveMap:
+        moved = section_map.moved("slope", slope + share * (target - slope))
+        return ActiveMap(
+            moved.walker, moved.inter_leg_angle, (share * left, share * right), moved.n_steps
         )
-        residual = float(np.abs(change(solution.x)).max())
-    except (LeanYawError, ValueError) as error:
-        tried.append(f"from {name}: {error}")
-        return None
-    if residual <= RESIDUAL_LIMIT:
-        return full(solution.x)
-    tried.append(f"from {name}: the root finder stopped at a residual of {residual:.1e}")
-    return None
+
+    return follow_fixed_point(path, _search(path(0.0), exact), exact=exact)[1]

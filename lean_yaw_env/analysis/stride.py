@@ -10,7 +10,13 @@ from numpy.typing import ArrayLike
 from lean_yaw_env.errors import FellError
 from lean_yaw_env.kernel.jacobian import INPUTS, step_jacobian
 from lean_yaw_env.kernel.records import Command
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, STATE_SIZE, Vector, require_state
+from lean_yaw_env.parameters import (
+    INTER_LEG_ANGLE,
+    STATE_SIZE,
+    Vector,
+    require_mass_offset,
+    require_state,
+)
 from lean_yaw_env.walker import (
     FALL_OF_STATUS,
     OTHER_FOOT,
@@ -62,6 +68,22 @@ class Step:
     by_previous_offset: Vector
 
 
+def require_offsets(mass_offset: float | tuple[float, float]) -> tuple[float, float]:
+    """Offsets in force while the left and while the right foot stands, or ``ValueError``."""
+    if isinstance(mass_offset, (tuple, list, np.ndarray)):
+        if len(mass_offset) != 2:
+            raise ValueError(
+                f"mass_offset must be a number or a pair (left foot's, right foot's), "
+                f"not {mass_offset!r}"
+            )
+        left, right = mass_offset
+        return require_mass_offset(left, "left mass_offset"), require_mass_offset(
+            right, "right mass_offset"
+        )
+    both = require_mass_offset(mass_offset)
+    return both, both
+
+
 def differentiate_step(walker: Walker, state: ArrayLike, stance: Foot, command: Command) -> Step:
     """One walking step with its exact derivatives (complex step through the kernel; the landing time's share included).
 
@@ -89,9 +111,18 @@ def stride_map(
     state: ArrayLike,
     *,
     inter_leg_angle: float = INTER_LEG_ANGLE,
-    mass_offset: float = 0.0,
+    mass_offset: float | tuple[float, float] = 0.0,
 ) -> tuple[StepResult, StepResult]:
-    """The two steps of a stride that starts on the left foot, at a constant command; the section state is the second one's.
+    """The two steps of a stride that starts on the left foot; the section state is the second one's.
+
+    Parameters
+    ----------
+    walker : Walker
+    state : shape (5,)
+    inter_leg_angle : (0, pi/2)
+    mass_offset : [-1, 1], or a pair of them
+        Constant, or in force while the left and while the right foot stands: the masses then start
+        the stride where the right foot's step has left them.
 
     Raises
     ------
@@ -100,8 +131,11 @@ def stride_map(
     ValueError
         If an argument is outside its range.
     """
+    left, right = require_offsets(mass_offset)
     first = require_completed(
-        walker.step(state, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset),
+        walker.step(
+            state, inter_leg_angle=inter_leg_angle, mass_offset=left, previous_offset=right
+        ),
         "the stride's first step",
     )
     second = require_completed(
@@ -109,7 +143,8 @@ def stride_map(
             first.state,
             stance=first.stance,
             inter_leg_angle=inter_leg_angle,
-            mass_offset=mass_offset,
+            mass_offset=right,
+            previous_offset=first.mass_offset,
         ),
         "the stride's second step",
     )
@@ -121,11 +156,13 @@ def stride_jacobian(
     state: ArrayLike,
     *,
     inter_leg_angle: float = INTER_LEG_ANGLE,
-    mass_offset: float = 0.0,
+    mass_offset: float | tuple[float, float] = 0.0,
 ) -> StrideJacobian:
     """Linearise the stride map at a point of the heel-strike section, left stance.
 
-    At a fixed point the matrix's eigenvalues are the gait's Floquet multipliers; elsewhere they mean nothing of the kind.
+    At a fixed point the matrix's eigenvalues are the gait's Floquet multipliers; elsewhere they
+    mean nothing of the kind. With an offset for each foot, the masses are taken to arrive within
+    each step, and the derivative by the offset is by a change common to both.
 
     Raises
     ------
@@ -134,9 +171,11 @@ def stride_jacobian(
     ValueError
         If an argument is outside its range.
     """
-    command = require_command(inter_leg_angle, mass_offset, None)
-    first = differentiate_step(walker, state, "left", command)
-    second = differentiate_step(walker, first.state, OTHER_FOOT["left"], command)
+    left, right = require_offsets(mass_offset)
+    first = differentiate_step(walker, state, "left", require_command(inter_leg_angle, left, right))
+    second = differentiate_step(
+        walker, first.state, OTHER_FOOT["left"], require_command(inter_leg_angle, right, left)
+    )
     return StrideJacobian(
         state=second.state,
         matrix=second.by_state @ first.by_state,

@@ -1,0 +1,387 @@
+"""Following a gait along a parameter, round folds, by pseudo-arclength continuation.
+
+Each step along the branch is predicted along its tangent and corrected by Newton's method on the
+section map with all its derivatives exact, the parameter's among them. Where a multiplier leaves or
+enters the unit circle is located by a root finder along the branch.
+
+A symmetric gait is followed as fixed point of one mirrored step, and its multipliers are of that; a
+stride's are their squares. A multiplier of -1 of the mirrored step, +1 of the stride, is where a
+gait begins that repeats after two steps: one that limps, or, in a three-dimensional mode, turns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from lean_yaw_env.analysis.limit_cycle import LimitCycle, cycle_at, find_limit_cycle
+from lean_yaw_env.analysis.progress import Counter
+from lean_yaw_env.analysis.section_map import (
+    ActiveMap,
+    PassiveMap,
+    require_left_state,
+    section_map_of,
+)
+from lean_yaw_env.errors import LeanYawError, NoGaitError
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector, require_number
+from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.walker import Walker
+
+EventKind = Literal["fold", "real +1", "real -1", "complex pair"]
+
+STATE_SCALE = 0.3
+"""A change of a coordinate by this counts as much as the parameter's whole range."""
+_FIRST_STEP = 0.01
+_SMALLEST_STEP = 1e-6
+_NEWTON_STEPS = 10
+_RESIDUAL = 1e-11
+_MOST_TURN = 0.9
+"""Least cosine of the angle between the tangents at a step's ends."""
+_NOT_REAL = 1e-6
+_SAME_PLACE = 1e-9
+
+
+@dataclass(frozen=True)
+class Event:
+    """A place on a branch where a multiplier crosses the unit circle.
+
+    Attributes
+    ----------
+    kind : "fold", "real +1", "real -1" or "complex pair"
+        A fold is a real +1 where the branch turns back in the parameter.
+    value : float
+        Of the parameter.
+    state : shape (5,) or (6,)
+    eigenvalue : complex
+        The multiplier on the unit circle, of the branch's map.
+    is_leaving : bool
+        Whether the number of multipliers outside the unit circle grows along the branch.
+    """
+
+    kind: EventKind
+    value: float
+    state: Vector
+    eigenvalue: complex
+    is_leaving: bool
+
+
+@dataclass(frozen=True)
+class Branch:
+    """A gait followed along a parameter, in the order in which it was followed.
+
+    Attributes
+    ----------
+    parameter : str
+    values : shape (n,)
+        Of the parameter; not monotonic past a fold.
+    states : shape (n, 5) or (n, 6)
+    eigenvalues : shape (n, m), complex
+        Of the map over ``n_steps``: mirrored steps for a symmetric gait, by falling magnitude.
+    n_steps : int
+    events : tuple of Event
+    ended : str
+        Why the branch ends.
+    section_map : ActiveMap or PassiveMap
+        The map at the start of the branch.
+    """
+
+    parameter: str
+    values: Vector
+    states: Vector
+    eigenvalues: NDArray[np.complex128]
+    n_steps: int
+    events: tuple[Event, ...]
+    ended: str
+    section_map: ActiveMap | PassiveMap
+
+    @property
+    def is_stable(self) -> NDArray[np.bool_]:
+        """Whether the gait at each point is stable, shape (n,)."""
+        return np.abs(self.eigenvalues).max(axis=1) < 1.0
+
+    def cycle(self, index: int) -> LimitCycle:
+        """The gait at a point of the branch."""
+        moved = self.section_map.moved(self.parameter, float(self.values[index]))
+        return cycle_at(moved, self.states[index])
+
+
+def continue_gait(
+    walker: Walker | PassiveWalker,
+    parameter: str,
+    limits: tuple[float, float],
+    *,
+    state: Vector | None = None,
+    n_steps: int | None = None,
+    inter_leg_angle: float = INTER_LEG_ANGLE,
+    mass_offset: float | tuple[float, float] = 0.0,
+    upward: bool = True,
+    longest_step: float = 0.05,
+    most_points: int = 1000,
+    progress: bool = False,
+) -> Branch:
+    """Follow a gait along a parameter until it leaves an interval, ends, or enough points are known.
+
+    Parameters
+    ----------
+    walker : Walker or PassiveWalker
+        Where the branch starts.
+    parameter : str
+        One of ``BODY_PARAMETERS``, or for the active walker ``COMMAND_PARAMETERS``.
+    limits : (low, high)
+        Interval of the parameter, which holds its value at the start.
+    state : shape (5,) or (6,), optional
+        A gait's section state to start from; by default ``find_limit_cycle``'s.
+    n_steps : int, optional
+        Steps until ``state`` recurs; by default the fewest for a simple gait.
+    inter_leg_angle, mass_offset : see ``find_limit_cycle``
+    upward : bool
+        Whether the parameter grows at first.
+    longest_step : (0, 1]
+        Of the arclength, in which the interval has length one and ``STATE_SCALE`` too.
+    most_points : int >= 2
+    progress : bool
+        Show a counter of points.
+
+    Raises
+    ------
+    NoGaitError
+        If there is no gait to start from.
+    ValueError
+        If an argument is outside its range.
+    """
+    if parameter == "mass_offset" and n_steps is None:
+        n_steps = 2  # the same offset for both feet, but for none, is no mirror image of itself
+    section_map = section_map_of(
+        walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset, n_steps=n_steps
+    )
+    low, high = _require_limits(limits, parameter, section_map.value(parameter))
+    require_number("longest_step", longest_step, 0.0, 1.0, "(]")
+    require_number("most_points", most_points, 2, 1_000_000)
+    if state is None:
+        state = find_limit_cycle(
+            walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset
+        ).state
+    curve = _Curve(section_map, parameter, require_left_state(section_map, state), high - low)
+    point = curve.start(1.0 if upward else -1.0)
+    points, events = [point], []
+    step, ended = min(_FIRST_STEP, longest_step), "the asked number of points"
+    with Counter("continuation", progress) as counter:
+        while len(points) < most_points:
+            following, step, why = _next_point(curve, points[-1], step, longest_step)
+            if following is None:
+                ended = why
+                break
+            here = curve.value(following)
+            if not low <= here <= high:
+                edge = _edge(curve, points[-1], following, low if here < low else high)
+                events.extend(_events(curve, points[-1], edge))
+                points.append(edge)
+                ended = f"{parameter} reached {curve.value(edge):g}"
+                break
+            events.extend(_events(curve, points[-1], following))
+            points.append(following)
+            counter.advance()
+    return Branch(
+        parameter=parameter,
+        values=np.array([curve.value(p) for p in points]),
+        states=np.array([curve.state(p.place) for p in points]),
+        eigenvalues=np.array([p.eigenvalues for p in points]),
+        n_steps=section_map.n_steps,
+        events=tuple(events),
+        ended=ended,
+        section_map=section_map,
+    )
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A point of the branch in scaled coordinates, the parameter last; its tangent, multipliers."""
+
+    place: Vector
+    tangent: Vector
+    eigenvalues: NDArray[np.complex128]
+    iterations: int
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """The scaled curve of fixed points in the space of free coordinates and parameter."""
+
+    section_map: ActiveMap | PassiveMap
+    parameter: str
+    template: Vector
+    parameter_scale: float
+
+    @property
+    def scales(self) -> Vector:
+        return np.append(np.full(len(self.section_map.free), STATE_SCALE), self.parameter_scale)
+
+    def value(self, point: _Point) -> float:
+        return float(point.place[-1] * self.parameter_scale)
+
+    def state(self, place: Vector) -> Vector:
+        state = self.template.copy()
+        state[self.section_map.free] = (place * self.scales)[:-1]
+        return state
+
+    def equations(self, place: Vector) -> tuple[Vector, Vector, Vector]:
+        """Residual (m,), its scaled derivative (m, m + 1), and the map's own Jacobian (m, m)."""
+        value = float(place[-1] * self.parameter_scale)
+        moved = self.section_map.moved(self.parameter, value)
+        free, state = self.section_map.free, self.state(place)
+        image, matrix, by_parameter = moved.sensitivity(state, self.parameter)
+        own = matrix[np.ix_(free, free)]
+        whole = np.column_stack([own - np.eye(len(free)), by_parameter[free]])
+        return (image - state)[free], whole * self.scales, own
+
+    def start(self, direction: float) -> _Point:
+        place = (
+            np.append(self.template[self.section_map.free], self.section_map.value(self.parameter))
+            / self.scales
+        )
+        along = np.zeros(place.size)
+        along[-1] = direction
+        return self.corrected(place, along)
+
+    def corrected(self, place: Vector, along: Vector) -> _Point:
+        """The branch's point in the plane through ``place`` square to ``along``.
+
+        Raises
+        ------
+        NoGaitError, ValueError
+            If Newton's method does not reach it.
+        """
+        anchor = place
+        for iteration in range(_NEWTON_STEPS):
+            residual, slope, own = self.equations(place)
+            bordered = np.vstack([slope, along])
+            if iteration > 0 and float(np.abs(residual).max()) < _RESIDUAL:
+                tangent = np.linalg.solve(bordered, np.append(np.zeros(residual.size), 1.0))
+                eigenvalues = np.asarray(np.linalg.eigvals(own), dtype=complex)
+                order = np.lexsort((-np.imag(eigenvalues), -np.abs(eigenvalues)))
+                return _Point(
+                    place, tangent / np.linalg.norm(tangent), eigenvalues[order], iteration
+                )
+            miss = np.append(residual, along @ (place - anchor))
+            place = place - np.linalg.solve(bordered, miss)
+        raise NoGaitError("Newton's method does not reach the branch")
+
+    def beyond(self, point: _Point, length: float) -> _Point:
+        """The branch's point at this arclength along the tangent."""
+        return self.corrected(point.place + length * point.tangent, point.tangent)
+
+
+def _next_point(
+    curve: _Curve, point: _Point, step: float, longest: float
+) -> tuple[_Point | None, float, str]:
+    """The next point with the step to try after it, or None and why the branch ends."""
+    why = ""
+    while step >= _SMALLEST_STEP:
+        try:
+            found = curve.beyond(point, step)
+        except (LeanYawError, ValueError, np.linalg.LinAlgError) as error:
+            why, step = str(error), 0.5 * step
+            continue
+        if found.tangent @ point.tangent < _MOST_TURN:
+            why, step = "the branch turns too sharply", 0.5 * step
+            continue
+        factor = 1.5 if found.iterations <= 3 else 0.7 if found.iterations >= 6 else 1.0
+        return found, min(step * factor, longest), ""
+    return None, step, why
+
+
+def _edge(curve: _Curve, point: _Point, following: _Point, limit: float) -> _Point:
+    """The point between two at which the parameter has the value ``limit``."""
+
+    def beyond(length: float) -> float:
+        return curve.value(curve.beyond(point, length)) - limit
+
+    whole = float((following.place - point.place) @ point.tangent)
+    length = float(brentq(beyond, 0.0, whole, xtol=1e-13))  # pyright: ignore[reportArgumentType]
+    return curve.beyond(point, length)
+
+
+def _fold_test(point: _Point) -> float:
+    return float(point.tangent[-1])
+
+
+def _plus_test(point: _Point) -> float:
+    return float(np.real(np.prod(point.eigenvalues - 1.0)))
+
+
+def _minus_test(point: _Point) -> float:
+    return float(np.real(np.prod(point.eigenvalues + 1.0)))
+
+
+def _pair_test(point: _Point) -> float:
+    """The product over all pairs of (product of the two, less one): zero for a pair on the circle."""
+    first, second = np.triu_indices(point.eigenvalues.size, 1)
+    return float(np.real(np.prod(point.eigenvalues[first] * point.eigenvalues[second] - 1.0)))
+
+
+_TESTS: tuple[tuple[EventKind, Callable[[_Point], float], complex], ...] = (
+    ("fold", _fold_test, 1.0),
+    ("real +1", _plus_test, 1.0),
+    ("real -1", _minus_test, -1.0),
+    ("complex pair", _pair_test, 1j),
+)
+
+
+def _events(curve: _Curve, point: _Point, following: _Point) -> list[Event]:
+    """Crossings of the unit circle between two points, in their order."""
+    whole = float((following.place - point.place) @ point.tangent)
+    found: list[tuple[float, Event]] = []
+    for kind, test, circle in _TESTS:
+        before, after = test(point), test(following)
+        if before == 0.0 or before * after >= 0.0:
+            continue
+
+        def signed(length: float, test: Callable[[_Point], float] = test) -> float:
+            return test(curve.beyond(point, length))
+
+        try:
+            length = float(brentq(signed, 0.0, whole, xtol=1e-12))  # pyright: ignore[reportArgumentType]
+        except (LeanYawError, ValueError):
+            continue  # the corrector fails in between: nothing can be said
+        place = curve.beyond(point, length)
+        eigenvalue = _critical(place, kind, circle)
+        if eigenvalue is None:
+            continue
+        if any(
+            other.kind == "fold" and kind == "real +1" and abs(at - length) < 1e-6
+            for at, other in found
+        ):
+            continue  # a fold is a real +1 already
+        outside = [int((np.abs(p.eigenvalues) > 1.0).sum()) for p in (point, following)]
+        event = Event(
+            kind, curve.value(place), curve.state(place.place), eigenvalue, outside[1] > outside[0]
+        )
+        found.append((length, event))
+    return [event for _, event in sorted(found, key=lambda pair: pair[0])]
+
+
+def _critical(point: _Point, kind: EventKind, circle: complex) -> complex | None:
+    """The multiplier on the circle; None for two real ones whose product is one."""
+    values = point.eigenvalues
+    if kind != "complex pair":
+        return complex(values[np.argmin(np.abs(values - circle))])
+    upper = values[np.imag(values) > _NOT_REAL]
+    if upper.size == 0 or np.abs(np.abs(upper) - 1.0).min() > _SAME_PLACE**0.5:
+        return None
+    return complex(upper[np.argmin(np.abs(np.abs(upper) - 1.0))])
+
+
+def _require_limits(
+    limits: tuple[float, float], parameter: str, value: float
+) -> tuple[float, float]:
+    low, high = (float(limit) for limit in limits)
+    if not low < high:
+        raise ValueError(f"limits must be (low, high) with low < high, not {limits!r}")
+    if not low <= value <= high:
+        raise ValueError(f"limits {limits!r} must hold the start's {parameter}, {value:g}")
+    return low, high
