@@ -23,7 +23,13 @@ from lean_yaw_env.kernel.records import (
     SLIP,
     Flight,
 )
-from lean_yaw_env.kernel.stance import accelerations, accelerations_and_contact
+from lean_yaw_env.kernel.stance import (
+    accelerations,
+    accelerations_and_contact,
+    mass_matrix,
+    mass_offset,
+    middle_of_masses,
+)
 from lean_yaw_env.kernel.swing import foot_gap
 
 # Largest estimated error of a step in any coordinate: keeps a walking step within 1e-10 of the exact one (measured: 4e-11).
@@ -35,8 +41,13 @@ FIRST_STEP = 0.4
 # A landing closer than this is reached by one classical fourth-order step, whose error is then below 1e-12.
 LANDING_WINDOW = 0.01
 SHIFTING_LANDING_WINDOW = 0.002  # the moving masses' path has larger derivatives
-# A walking step takes two to ten attempts; a solver that needs this many is stuck.
-MOST_ATTEMPTS = 400.0
+# The same, in steps that the error control allows: a walker that collapses moves on a shorter time scale.
+LANDING_WINDOW_SHARE = 0.04
+# A walking step takes two to ten attempts, one with a stiff ankle some hundreds; a solver that needs this many is stuck.
+MOST_ATTEMPTS = 4000.0
+# Without hip width foot and ankle can come to move the masses alike: accelerations then grow without bound and nothing holds the walker.
+# This is the least of 1 - m12^2 / (m11 m22) that is walked through; ordinary steps stay above 0.5.
+LEAST_INDEPENDENCE = 1e-3
 _UNKNOWN = 1e9
 _FAR = 10.0
 _SAME_TIME = 1e-9
@@ -120,6 +131,15 @@ def first_step_length(landing, shift_end):
 def shift_end_of(stance):
     """When the masses stop, or zero if they do not move."""
     return 1.0 / stance.shift_rate if stance.offset_change.real != 0.0 else 0.0
+
+
+@inlined
+def is_collapsing(stance, time, sin_a, cos_a, sin_twist, cos_twist, upright):
+    """Whether an ankle is past a right angle (``upright``: the swing foot's), or foot and ankle no longer move the masses apart."""
+    z, q, dq = middle_of_masses(stance, sin_twist, cos_twist, mass_offset(stance, time)[0])
+    _, _, m11, m12, m22 = mass_matrix(stance, sin_a, cos_a, sin_twist, z, q, dq)
+    independent = (m11 * m22 - m12 * m12).real > LEAST_INDEPENDENCE * (m11 * m22).real
+    return (cos_twist.real <= 0.0) | (upright.real <= 0.0) | (not independent)
 
 
 @inlined
@@ -229,21 +249,23 @@ def advance(stance, flight):
         gap.real, gap_rate.real, gap_acceleration.real,
     )  # fmt: skip
 
+    collapses = is_collapsing(stance, time, sin_a, cos_a, sin_twist, cos_twist, upright)
     shift_end = shift_end_of(stance)
     begins_shifting = flight.time.real < shift_end - _SAME_TIME
     shifting = now < shift_end - _SAME_TIME
     caution = SHIFT_CAUTION * abs(stance.offset_change.real) if begins_shifting else 0.0
     ratio = error * (1.0 + caution) / STEP_TOLERANCE
     accurate = ratio <= 1.0  # a NaN is not
+    factor = 0.9 / np.sqrt(np.sqrt(np.sqrt(max(ratio, 1e-8))))
+    longer = h * min(max(factor, 0.5), 4.0)
     window = SHIFTING_LANDING_WINDOW if shifting else LANDING_WINDOW
+    window = min(window, LANDING_WINDOW_SHARE * longer)
     repeat = passed & (landing < -window)
     accepted = accurate & (not repeat)
     landed = accepted & (abs(landing) <= window) & ((not shifting) | (now + landing <= shift_end))
 
-    factor = 0.9 / np.sqrt(np.sqrt(np.sqrt(max(ratio, 1e-8))))
     shorter = h * min(max(factor, 0.2), 0.9) if ratio > 1.0 else 0.2 * h
     shorter = h + landing if accurate else shorter
-    longer = h * min(max(factor, 0.5), 4.0)
     ahead = landing if landing > 0.0 else _UNKNOWN
     onward = next_step_length(longer, ahead, now, shift_end)
     onward = landing if landed else onward
@@ -258,7 +280,7 @@ def advance(stance, flight):
         status = NO_STRIKE if now >= stance.max_duration.real else status
         status = BACKWARD if rolls_back else status
         status = LANDING if landed else status
-        status = SIDEWAYS if (cos_twist.real <= 0.0) | (upright.real <= 0.0) else status
+        status = SIDEWAYS if collapses else status
         status = SLIP if most > stance.friction_limit_squared.real else status
         status = LIFT_OFF if least <= 0.0 else status
 

@@ -12,6 +12,7 @@ from lean_yaw_env.kernel.elementary import sine_cosine, within_half_turn
 from lean_yaw_env.kernel.flight import (
     advance,
     first_step_length,
+    is_collapsing,
     shift_end_of,
     time_to_touch,
 )
@@ -42,7 +43,7 @@ from lean_yaw_env.kernel.stance import (
 from lean_yaw_env.kernel.swing import foot_gap
 
 # The gap before the last correction, which squares it: above this, the landing was not found.
-LANDING_RESIDUAL = 1e-9
+LANDING_RESIDUAL = 1e-7
 
 
 @inlined
@@ -99,7 +100,8 @@ def start(stance, body, pitch, twist, pitch_rate, twist_rate):
     status = BACKWARD if rolls_back else FLYING
     status = TRIP if buried else status
     status = LANDING if strikes else status
-    status = SIDEWAYS if (cos_twist.real <= 0.0) | (upright.real <= 0.0) else status
+    collapses = is_collapsing(stance, time, sin_a, cos_a, sin_twist, cos_twist, upright)
+    status = SIDEWAYS if collapses else status
     status = SLIP if friction.real > stance.friction_limit_squared.real else status
     status = LIFT_OFF if normal.real <= 0.0 else status
     return Flight(
