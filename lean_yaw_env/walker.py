@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -202,8 +203,7 @@ class Walker:
         start = require_state(state)
         foot = require_foot(stance)
         command = require_command(inter_leg_angle, mass_offset, previous_offset)
-        outcome = step_kernel(self.parameters.body(), command, *start.tolist(), SIDE[foot])
-        return _result(outcome, foot, start, self.parameters)
+        return self._step(start, foot, command)
 
     def walk(
         self,
@@ -251,8 +251,7 @@ class Walker:
         fall = None
         for command in commands:
             moved = command._replace(offset_before=in_force[-1])
-            outcome = step_kernel(self.parameters.body(), moved, *current.tolist(), SIDE[foot])
-            result = _result(outcome, foot, current, self.parameters)
+            result = self._step(current, foot, moved)
             if samples_per_step:
                 rows = self._trace(current, foot, moved, result.duration, samples_per_step)
                 path.append(_centre_path(rows, current[0], footprints[-1], sum(durations)))
@@ -314,6 +313,16 @@ class Walker:
             require_state(state), require_foot(stance), command, float(duration), int(samples)
         )
         return {name: rows[:, i].copy() for i, name in enumerate(COLUMNS)}
+
+    @cached_property
+    def _body(self) -> Vector:
+        """The parameters as the kernel's row."""
+        return np.array(self.parameters.body())
+
+    def _step(self, state: Vector, foot: Foot, command: Command) -> StepResult:
+        row = np.empty(len(Outcome._fields))
+        step_kernel(self._body, np.array(command), state, SIDE[foot], row)
+        return _result(Outcome._make(row.tolist()), foot, state, self.parameters)
 
     def _trace(
         self, state: Vector, stance: Foot, command: Command, duration: float, samples: int
