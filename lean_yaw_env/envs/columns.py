@@ -18,14 +18,32 @@ DISTANCE = 12  # summed advances
 INTER_LEG_ANGLE = 13  # commanded in the last step
 COMMANDED_OFFSET = 14
 ADVANCE = 15  # of the last step, along the mean heading of its two footprints: sideways, left and right ones alternate
-TASK = 16  # the first of the task's own columns
-TASK_COLUMNS = 12
+BODY = 16  # the walker's own hip width, foot radius, ankle tilt and slope
+BODY_COLUMNS = 4
+PENDING_ANGLE = 20  # commands on their way, where actions are delayed
+PENDING_OFFSET = 21
+PITCH_PUSH = 22  # the last push, on the rates
+ANKLE_PUSH = 23
+TASK = 24  # the first of the task's own columns
+TASK_COLUMNS = 14
 MEMORY = TASK + TASK_COLUMNS
 
 # --- settings: what is fixed for an environment
 BASE_ANGLE, ANGLE_RANGE, OFFSET_RANGE, OFFSET_CHANGE, HORIZON, MIRRORED, DISTURBANCE = range(7)
 GAIT = 7  # a left-stance section state
-SETTINGS = GAIT + STATE_SIZE
+GAIT_OFFSET = GAIT + STATE_SIZE  # mass offset in force in that state
+DELAYED = GAIT_OFFSET + 1
+NOISE = GAIT_OFFSET + 2
+HIDES_RATES = GAIT_OFFSET + 3
+HIDES_HEADING = GAIT_OFFSET + 4
+PITCH_PUSH_SIZE = GAIT_OFFSET + 5  # standard deviations
+ANKLE_PUSH_SIZE = GAIT_OFFSET + 6
+BODY_DRAW = GAIT_OFFSET + 7  # which bodies: see ``transition.draw_body``
+BODY_CENTRE = GAIT_OFFSET + 8
+BODY_REACH = BODY_CENTRE + BODY_COLUMNS
+TASK_CONSTANTS = BODY_REACH + BODY_COLUMNS  # the first of the task's own
+TASK_SETTINGS = 4
+SETTINGS = TASK_CONSTANTS + TASK_SETTINGS
 
 # --- outcomes: a step's record
 OUTCOMES = len(Outcome._fields)

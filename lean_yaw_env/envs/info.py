@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lean_yaw_env.envs import columns as c
+from lean_yaw_env.envs.options import BODY_NAMES
 from lean_yaw_env.envs.tasks import Task
 from lean_yaw_env.kernel.compilation import entry_point
 from lean_yaw_env.kernel.records import Outcome
@@ -47,12 +48,12 @@ _FIRST_SCALAR = STATE_SIZE + 2  # after the state and the footprint
 
 
 class InfoTable:
-    """The numbers of ``info`` for a task, in order.
+    """The numbers of ``info`` for a task and its settings, in order.
 
     ``state`` (5,) and ``footprint`` (2,) come first, then scalars: see ``describe``. ``fall`` is the way the walker fell in this step, or None.
     """
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: Task, settings: Vector) -> None:
         rows = [(Source.MEMORY, k, 0) for k in range(STATE_SIZE)]
         rows += [(Source.MEMORY, c.PLACE_X, 0), (Source.MEMORY, c.PLACE_Z, 0)]
         names: list[str] = []
@@ -68,9 +69,16 @@ class InfoTable:
             names.append(name)
             kind = Source.MEMORY if metric.divisor is None else Source.QUOTIENT
             rows.append((kind, metric.column, metric.divisor or 0))
+        memory_fields: list[tuple[str, int]] = []
         if task.command_column is not None:
-            names.append("commanded_heading")
-            rows.append((Source.MEMORY, task.command_column, 0))
+            memory_fields.append(("commanded_heading", task.command_column))
+        if settings[c.PITCH_PUSH_SIZE] > 0.0 or settings[c.ANKLE_PUSH_SIZE] > 0.0:
+            memory_fields += [("pitch_push", c.PITCH_PUSH), ("ankle_push", c.ANKLE_PUSH)]
+        if settings[c.BODY_DRAW] > 0.0:
+            memory_fields += [(name, c.BODY + k) for k, name in enumerate(BODY_NAMES)]
+        for name, column in memory_fields:
+            names.append(name)
+            rows.append((Source.MEMORY, column, 0))
         self.names = tuple(names)
         self.sources = np.array(rows, dtype=np.int64)
 

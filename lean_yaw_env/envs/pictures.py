@@ -31,7 +31,7 @@ class Footage:
         self._footprints.append(memory[[c.PLACE_X, c.PLACE_Z]])
         self._headings.append(float(memory[c.HEADING]))
         self._feet.append(self._foot())
-        centre = walker_shape(self._rows.parameters, self._pose()).centre
+        centre = walker_shape(self._rows.body_parameters(0), self._pose()).centre
         self._path.append(centre[[0, 2]])
 
     def scene(self, fall: str | None) -> Scene:
@@ -39,7 +39,7 @@ class Footage:
         column = self._rows.task.command_column
         command = None if column is None else float(memory[column])
         return Scene(
-            parameters=self._rows.parameters,
+            parameters=self._rows.body_parameters(0),
             pose=self._pose(),
             footprints=np.array(self._footprints),
             headings=np.array(self._headings),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,16 +10,26 @@ from numpy.typing import NDArray
 
 from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.info import InfoTable
-from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
+from lean_yaw_env.envs.options import ACTION_SIZE, BODY_NAMES, EnvOptions
 from lean_yaw_env.envs.running import FAILURE, NOT_A_NUMBER
 from lean_yaw_env.envs.tasks import Task
 from lean_yaw_env.errors import SolverError
 from lean_yaw_env.kernel import records
-from lean_yaw_env.parameters import MIRROR, STATE_SIZE, require_foot, require_number, require_state
+from lean_yaw_env.parameters import (
+    MIRROR,
+    STATE_SIZE,
+    WalkerParameters,
+    require_foot,
+    require_number,
+    require_state,
+)
 from lean_yaw_env.walker import SIDE
 
-RESET_OPTIONS = ("state", "stance", "command")
+RESET_OPTIONS = ("state", "stance")
+"""Of every task; some have commands besides."""
 _KEYS = 2**64
+_ODD_COLUMNS = (c.OFFSET, c.COMMANDED_OFFSET, c.PENDING_OFFSET)
+"""What changes sign, beside the state, in a mirror image of the start."""
 
 
 class WalkerRows:
@@ -30,7 +41,8 @@ class WalkerRows:
         self.n = n
         self.parameters = options.walker_parameters(task)
         self.settings = options.settings(task)
-        self.bodies = np.array([self.parameters.body()])
+        one_each = options.random_body is not None
+        self.bodies = np.tile(np.array(self.parameters.body()), (n if one_each else 1, 1))
         self.memory = np.zeros((n, c.MEMORY))
         self.stream = np.zeros((n, 2), dtype=np.uint64)
         self.actions = np.zeros((n, ACTION_SIZE), dtype=np.float32)
@@ -39,7 +51,7 @@ class WalkerRows:
         self.rewards = np.zeros(n)
         self.terminated = np.zeros(n, dtype=np.bool_)
         self.truncated = np.zeros(n, dtype=np.bool_)
-        self.info = InfoTable(task)
+        self.info = InfoTable(task, self.settings)
         self._step_arguments = (
             self.bodies, self.memory, self.stream, self.settings, self.actions, self.outcomes,
             self.observations, self.rewards, self.terminated, self.truncated,
@@ -56,7 +68,7 @@ class WalkerRows:
         self.rewards[rows] = 0.0
         self.terminated[rows] = False
         self.truncated[rows] = False
-        self.task.start_many(self.memory, self.stream, self.settings, self.observations, rows, True)
+        self._start_many(rows, True)
 
     def place(self, rows: NDArray[np.int64], options: dict[str, Any]) -> None:
         """Override the drawn start by reset options (``RESET_OPTIONS``); arguments are checked before anything changes."""
@@ -66,32 +78,51 @@ class WalkerRows:
             if "side" in checked:
                 if memory[c.SIDE] != checked["side"]:
                     memory[:STATE_SIZE] *= MIRROR
+                    memory[list(_ODD_COLUMNS)] *= -1.0
                 memory[c.SIDE] = checked["side"]
             if "state" in checked:
                 memory[:STATE_SIZE] = checked["state"]
             memory[c.PREVIOUS_HEADING] = memory[c.HEADING]
-            if "command" in checked:
-                memory[self.task.command_column] = checked["command"]
+            for name, command in self.task.commands.items():
+                if name in checked:
+                    memory[list(command.columns)] = checked[name]
+        self._start_many(rows, False)
+
+    def body_parameters(self, row: int) -> WalkerParameters:
+        """The walker of a row: of random bodies, its own."""
+        if self.options.random_body is None:
+            return self.parameters
+        own = self.memory[row, c.BODY : c.BODY + c.BODY_COLUMNS].tolist()
+        return replace(self.parameters, **dict(zip(BODY_NAMES, own, strict=True)))
+
+    def _start_many(self, rows: NDArray[np.int64], fresh: bool) -> None:
         self.task.start_many(
-            self.memory, self.stream, self.settings, self.observations, rows, False
+            self.bodies, self.memory, self.stream, self.settings, self.observations, rows, fresh
         )
 
     def check_options(self, options: dict[str, Any]) -> dict[str, Any]:
         """Reset options as numbers, or ``ValueError``."""
         checked: dict[str, Any] = {}
+        known = (*RESET_OPTIONS, *self.task.commands)
         for key in options:
-            if key not in RESET_OPTIONS:
-                raise ValueError(f"reset option {key!r} is not one of {', '.join(RESET_OPTIONS)}")
+            if key not in known:
+                raise ValueError(
+                    f"reset option {key!r} is not one of {', '.join(known)} (task {self.task.name})"
+                )
         if "stance" in options:
             checked["side"] = SIDE[require_foot(options["stance"])]
         if "state" in options:
             checked["state"] = require_state(options["state"])
-        if "command" in options:
-            if self.task.command_column is None:
-                raise ValueError(
-                    f"reset option 'command': the task {self.task.name} has no command"
-                )
-            checked["command"] = require_number("command", options["command"], -np.pi, np.pi)
+        for name, command in self.task.commands.items():
+            if name in options:
+                values = np.atleast_1d(np.asarray(options[name], dtype=object)).tolist()
+                if len(values) != len(command.columns):
+                    raise ValueError(
+                        f"reset option {name!r} must hold {len(command.columns)} numbers, not {options[name]!r}"
+                    )
+                checked[name] = [
+                    require_number(name, value, command.low, command.high) for value in values
+                ]
         return checked
 
     def step_one(self) -> None:

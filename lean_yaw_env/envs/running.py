@@ -5,22 +5,29 @@ from __future__ import annotations
 import numpy as np
 
 from lean_yaw_env.envs import columns as c
-from lean_yaw_env.envs.transition import begin, command, move, observe
+from lean_yaw_env.envs.transition import begin, command, move, observe, push, veil
 from lean_yaw_env.kernel.batch import step_batch
 from lean_yaw_env.kernel.compilation import inlined
-from lean_yaw_env.kernel.records import FAILED, Body, Command
-from lean_yaw_env.kernel.step import walking_step
+from lean_yaw_env.kernel.records import FAILED, Command
+from lean_yaw_env.kernel.step import body_of, walking_step, write_outcome
 
 DONE, NOT_A_NUMBER, FAILURE = 0, 1, 2
 
 
 @inlined
-def start_row(memory, stream, settings, observations, i, fresh, task_begin, task_features):
+def start_row(bodies, memory, stream, settings, observations, i, fresh, task_begin, task_features):
     """Begin an episode of walker ``i`` (unless its memory was set by hand) and observe it."""
     if fresh:
-        begin(memory, stream, settings, i)
+        begin(bodies, memory, stream, settings, i)
         task_begin(memory, stream, settings, i)
+    show(memory, stream, settings, observations, i, task_features)
+
+
+@inlined
+def show(memory, stream, settings, observations, i, task_features):
+    """Write walker ``i``'s observation."""
     task_features(memory, settings, observations, i, observe(memory, settings, observations, i))
+    veil(stream, settings, observations, i)
 
 
 @inlined
@@ -32,10 +39,12 @@ def settle_row(
     if outcomes[i, c.OUTCOME_STATUS] == FAILED:
         return FAILURE
     walks = move(memory, outcomes, i)
+    if walks and (settings[c.PITCH_PUSH_SIZE] > 0.0 or settings[c.ANKLE_PUSH_SIZE] > 0.0):
+        push(memory, stream, settings, i)
     rewards[i], ends = task_reward(memory, stream, settings, actions, outcomes, i, walks)
     terminated[i] = ends or not walks
     truncated[i] = (not terminated[i]) and memory[i, c.TIME] >= settings[c.HORIZON]
-    task_features(memory, settings, observations, i, observe(memory, settings, observations, i))
+    show(memory, stream, settings, observations, i, task_features)
     return DONE
 
 
@@ -48,26 +57,17 @@ def run_one(
     if not (np.isfinite(actions[0, 0]) and np.isfinite(actions[0, 1])):
         return NOT_A_NUMBER
     command(memory, settings, actions, 0)
-    b = bodies[0]
     outcome = walking_step(
-        Body(b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7], b[8], b[9], b[10]),
+        body_of(bodies[0]),
         Command(memory[0, c.INTER_LEG_ANGLE], memory[0, c.COMMANDED_OFFSET], memory[0, c.OFFSET]),
         memory[0, c.HEADING], memory[0, c.PITCH], memory[0, c.ANKLE],
         memory[0, c.PITCH_RATE], memory[0, c.ANKLE_RATE], memory[0, c.SIDE],
     )  # fmt: skip
-    write_outcome(outcomes, outcome)
+    write_outcome(outcome, outcomes[0])
     return settle_row(
         memory, stream, settings, actions, outcomes, observations, rewards, terminated, truncated, 0,
         task_reward, task_features,
     )  # fmt: skip
-
-
-@inlined
-def write_outcome(outcomes, outcome):
-    k = 0
-    for value in outcome:
-        outcomes[0, k] = value
-        k += 1
 
 
 @inlined

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 
-from lean_yaw_env.envs.tasks.task import Metric, Task
+from lean_yaw_env.envs.tasks.task import Command, Feature, Metric, Task
 from lean_yaw_env.registration import TASK_VERSIONS
 
 
@@ -15,4 +15,4 @@ def task_named(name: str) -> Task:
     return importlib.import_module(f"{__name__}.{name.lower()}").TASK
 
 
-__all__ = ["Metric", "Task", "task_named"]
+__all__ = ["Command", "Feature", "Metric", "Task", "task_named"]

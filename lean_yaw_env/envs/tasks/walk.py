@@ -62,9 +62,11 @@ def step_many(
 
 
 @entry_point()
-def start_many(memory, stream, settings, observations, rows, fresh):
+def start_many(bodies, memory, stream, settings, observations, rows, fresh):
     for i in rows:
-        start_row(memory, stream, settings, observations, i, fresh, task_begin, task_features)
+        start_row(
+            bodies, memory, stream, settings, observations, i, fresh, task_begin, task_features
+        )
 
 
 TASK = Task(
@@ -73,5 +75,11 @@ TASK = Task(
     step_many=step_many,
     start_many=start_many,
     features=(),
-    metrics={"time_walked": Metric(c.TIME), "distance": Metric(c.DISTANCE)},
+    metrics={
+        "time_walked": Metric(c.TIME, None, "units of time"),
+        "distance": Metric(c.DISTANCE, None, "leg lengths, along the headings"),
+    },
+    summary="Keep walking; nothing is commanded.",
+    reward=f"{WALKING_RATE} - {EFFORT_RATE} effort",
+    history=("0: the first.",),
 )
