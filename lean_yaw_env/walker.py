@@ -36,10 +36,11 @@ class Fall(str, Enum):
     """The ways to fall, each by a physical criterion; members compare equal to their names."""
 
     BACKWARD = "backward"
-    """The stance leg moves backward and accelerates backward: it does not pass mid-stance."""
+    """The stance leg moves backward, faster than 0.1 rad per unit of time, and speeds up: it does not pass mid-stance."""
     SIDEWAYS = "sideways"
     """An ankle, of the stance foot or of the swing foot to be laid flat, would have to turn past a right angle, or the walker
-    comes down on its swing foot without moving forward onto it."""
+    comes down on its swing foot without moving forward onto it, or (next to no hip width) foot and ankle come to move the masses
+    alike, so that nothing holds them up."""
     TRIP = "trip"
     """The swing foot, put in front, is at or below the floor when the step starts."""
     LIFT_OFF = "lift-off"

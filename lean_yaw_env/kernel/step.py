@@ -13,6 +13,7 @@ from lean_yaw_env.kernel.flight import (
     advance,
     first_step_length,
     is_collapsing,
+    is_rolling_back,
     shift_end_of,
     time_to_touch,
 )
@@ -98,7 +99,7 @@ def start(stance, body, pitch, twist, pitch_rate, twist_rate):
     )
     buried = gap.real <= 0.0
     strikes = buried & (body.strike_at_start.real != 0.0)
-    rolls_back = (pitch_rate.real >= 0.0) & (dw.real >= 0.0)
+    rolls_back = is_rolling_back(pitch_rate, dw) & (shift_end_of(stance).real <= 0.0)
     status = BACKWARD if rolls_back else FLYING
     status = TRIP if buried else status
     status = LANDING if strikes else status
