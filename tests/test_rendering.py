@@ -516,7 +516,7 @@ def test_a_film_moves_without_jumps_within_and_between_steps(walker, recorder, t
 
 
 def test_a_film_s_scenes_are_the_walk_s(walker, recorder, tmp_path):
-    across = GAIT + [0.5, 0.0, 0.0, 0.0, 0.0]  # so that ahead is not downhill
+    across = np.array([0.5, *GAIT[1:]])  # so that ahead is not downhill
     walk = film(
         walker, 5, tmp_path / "walk.gif", state=across, commanded_heading=0.2, progress=False
     )
