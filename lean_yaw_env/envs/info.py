@@ -81,6 +81,7 @@ class InfoTable:
             rows.append((Source.MEMORY, column, 0))
         self.names = tuple(names)
         self.sources = np.array(rows, dtype=np.int64)
+        self._template: dict[str, Any] = dict.fromkeys(("state", "footprint", *names, "fall"))
 
     def fill(self, memory: Vector, outcomes: Vector) -> Vector:
         """A fresh array (numbers, walkers)."""
@@ -91,13 +92,13 @@ class InfoTable:
     def one(self, table: Vector, status: float) -> dict[str, Any]:
         """The info of a single environment."""
         column = table[:, 0]
-        info: dict[str, Any] = {
-            "state": column[:STATE_SIZE],
-            "footprint": column[STATE_SIZE:_FIRST_SCALAR],
-        }
+        info = self._template.copy()  # a copy that is filled is quicker than a dict that grows
         info.update(zip(self.names, column[_FIRST_SCALAR:].tolist(), strict=True))
+        info["state"] = column[:STATE_SIZE]
+        info["footprint"] = column[STATE_SIZE:_FIRST_SCALAR]
         fall = FALL_OF_STATUS.get(status)
-        info["fall"] = None if fall is None else fall.value
+        if fall is not None:
+            info["fall"] = fall.value
         return info
 
     def many(self, table: Vector, statuses: Vector, mask: NDArray[np.bool_]) -> dict[str, Any]:
