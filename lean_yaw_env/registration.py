@@ -9,6 +9,12 @@ NAMESPACE = "LeanYaw"
 TASK_VERSIONS = {
     "Heading": 0,
     "Walk": 0,
+    "SpeedHeading": 0,
+    "Waypoint": 0,
+    "Slalom": 0,
+    "Push": 0,
+    "UTurn": 0,
+    "Level": 0,
 }
 """Every task's name and version; the module of the same name in ``envs.tasks`` defines it."""
 

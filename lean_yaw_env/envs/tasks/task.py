@@ -19,12 +19,13 @@ class Metric:
 
 
 class Feature(NamedTuple):
-    """One number that a task appends to the observation: what it is, divided by ``scale``, which is in ``unit``."""
+    """One number that a task appends to the observation: what it is, less ``centre``, divided by ``scale``; both in ``unit``."""
 
     name: str
     scale: float
     unit: str
     meaning: str
+    centre: float = 0.0
 
 
 class Command(NamedTuple):
@@ -53,7 +54,7 @@ class Task:
         a sentence for each version.
     commands : reset options that set a command
     command_column : column of memory with the commanded heading, if there is one; pictures show it
-    goal_columns : columns of memory with the place (downhill, right) and the radius of a goal to be reached
+    goal_columns : columns of memory with the place (downhill, right) of a goal to be reached within ``goal_radius``
     reference_path : the path to be followed, as points (k, 2) on the floor, from a row of memory
     constants : at most ``columns.TASK_SETTINGS`` numbers that the task's formulas read from the settings
     parameters, horizon, max_offset_change, push_level : defaults of the environment
@@ -73,7 +74,8 @@ class Task:
     ends: str = "nothing else"
     commands: dict[str, Command] = field(default_factory=dict)
     command_column: int | None = None
-    goal_columns: tuple[int, int, int] | None = None
+    goal_columns: tuple[int, int] | None = None
+    goal_radius: float = 0.5
     reference_path: Callable[[Vector], Vector] | None = None
     constants: tuple[float, ...] = ()
     parameters: WalkerParameters = field(default_factory=WalkerParameters)
