@@ -50,7 +50,7 @@ class Footage:
                 step=int(memory[c.STEPS]),
                 time=float(memory[c.TIME]),
                 speed=float(memory[c.DISTANCE] / memory[c.TIME]) if memory[c.TIME] > 0.0 else None,
-                heading=float(memory[c.HEADING]),
+                heading=float(0.5 * (memory[c.HEADING] + memory[c.PREVIOUS_HEADING])),
                 commanded_heading=command,
                 status="walking" if fall is None else f"fell {fall}",
             ),
