@@ -148,7 +148,10 @@ def find_limit_cycle(
 
 
 def find_gait(
-    walker: Walker, *, inter_leg_angle: float = INTER_LEG_ANGLE, mass_offset: float = 0.0
+    walker: Walker,
+    *,
+    inter_leg_angle: float = INTER_LEG_ANGLE,
+    mass_offset: float | tuple[float, float] = 0.0,
 ) -> Vector:
     """The section state of ``find_limit_cycle`` alone, on the left foot, to the same residual.
 

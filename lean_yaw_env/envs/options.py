@@ -197,9 +197,13 @@ def action_space() -> spaces.Box:
 
 @lru_cache(maxsize=256)
 def gait_of(parameters: WalkerParameters, pumping: float = 0.0) -> tuple[float, ...]:
-    """The walker's gait at the paper's inter-leg angle, on the left foot; with an offset away from the stance foot if it pumps."""
+    """The walker's gait at the paper's inter-leg angle, on the left foot; with an offset away from the stance foot if it pumps.
+
+    It is the gait on a floor that does not let the foot slip: a walker may start where its own floor does not let it go on.
+    """
     offset = (pumping, -pumping) if pumping else 0.0
-    return tuple(find_gait(Walker(parameters), mass_offset=offset).tolist())
+    walker = Walker(replace(parameters, friction_limit=math.inf))
+    return tuple(find_gait(walker, mass_offset=offset).tolist())
 
 
 def _require_body_box(parameters: WalkerParameters) -> tuple[float, ...]:
