@@ -19,9 +19,9 @@ _VECTOR = 8  # doubles in the widest vector registers
 
 _STANCE = 0
 _FLIGHT = _STANCE + 18 * LANES
-_HEADING = _FLIGHT + 20 * LANES
+_HEADING = _FLIGHT + 22 * LANES
 _WHO = _HEADING + LANES
-_ROWS = 40
+_ROWS = 42
 _RETIRED = _ROWS * LANES
 _OUTCOME = 2 * _RETIRED
 # A walker's constants and command are rows only until its flight starts, in the place of its outcome
@@ -29,7 +29,7 @@ _BODY = _OUTCOME
 _COMMAND = _BODY + 11 * LANES
 _SIDE = _COMMAND + 3 * LANES
 _SIZE = _OUTCOME + 18 * LANES
-_STATUS = _FLIGHT + 16 * LANES
+_STATUS = _FLIGHT + 18 * LANES
 
 
 @inlined
@@ -92,15 +92,17 @@ def _load_flight(work, i):
         work[_FLIGHT + 8 * LANES + i],  # gap_rate
         work[_FLIGHT + 9 * LANES + i],  # gap_acceleration
         work[_FLIGHT + 10 * LANES + i],  # next_step
-        work[_FLIGHT + 11 * LANES + i],  # least_normal_force
-        work[_FLIGHT + 12 * LANES + i],  # friction_squared
-        work[_FLIGHT + 13 * LANES + i],  # damping_loss
-        work[_FLIGHT + 14 * LANES + i],  # evaluations
-        work[_FLIGHT + 15 * LANES + i],  # attempts
-        work[_FLIGHT + 16 * LANES + i],  # status
-        work[_FLIGHT + 17 * LANES + i],  # start_pitch
-        work[_FLIGHT + 18 * LANES + i],  # start_twist
-        work[_FLIGHT + 19 * LANES + i],  # start_kinetic
+        work[_FLIGHT + 11 * LANES + i],  # normal_force
+        work[_FLIGHT + 12 * LANES + i],  # tangential_squared
+        work[_FLIGHT + 13 * LANES + i],  # least_normal_force
+        work[_FLIGHT + 14 * LANES + i],  # friction_squared
+        work[_FLIGHT + 15 * LANES + i],  # damping_loss
+        work[_FLIGHT + 16 * LANES + i],  # evaluations
+        work[_FLIGHT + 17 * LANES + i],  # attempts
+        work[_FLIGHT + 18 * LANES + i],  # status
+        work[_FLIGHT + 19 * LANES + i],  # start_pitch
+        work[_FLIGHT + 20 * LANES + i],  # start_twist
+        work[_FLIGHT + 21 * LANES + i],  # start_kinetic
     )
 
 
@@ -117,15 +119,17 @@ def _store_flight(work, i, flight):
     work[_FLIGHT + 8 * LANES + i] = flight.gap_rate
     work[_FLIGHT + 9 * LANES + i] = flight.gap_acceleration
     work[_FLIGHT + 10 * LANES + i] = flight.next_step
-    work[_FLIGHT + 11 * LANES + i] = flight.least_normal_force
-    work[_FLIGHT + 12 * LANES + i] = flight.friction_squared
-    work[_FLIGHT + 13 * LANES + i] = flight.damping_loss
-    work[_FLIGHT + 14 * LANES + i] = flight.evaluations
-    work[_FLIGHT + 15 * LANES + i] = flight.attempts
-    work[_FLIGHT + 16 * LANES + i] = flight.status
-    work[_FLIGHT + 17 * LANES + i] = flight.start_pitch
-    work[_FLIGHT + 18 * LANES + i] = flight.start_twist
-    work[_FLIGHT + 19 * LANES + i] = flight.start_kinetic
+    work[_FLIGHT + 11 * LANES + i] = flight.normal_force
+    work[_FLIGHT + 12 * LANES + i] = flight.tangential_squared
+    work[_FLIGHT + 13 * LANES + i] = flight.least_normal_force
+    work[_FLIGHT + 14 * LANES + i] = flight.friction_squared
+    work[_FLIGHT + 15 * LANES + i] = flight.damping_loss
+    work[_FLIGHT + 16 * LANES + i] = flight.evaluations
+    work[_FLIGHT + 17 * LANES + i] = flight.attempts
+    work[_FLIGHT + 18 * LANES + i] = flight.status
+    work[_FLIGHT + 19 * LANES + i] = flight.start_pitch
+    work[_FLIGHT + 20 * LANES + i] = flight.start_twist
+    work[_FLIGHT + 21 * LANES + i] = flight.start_kinetic
 
 
 @inlined

@@ -11,6 +11,7 @@ import numpy as np
 
 from lean_yaw_env.kernel import verner
 from lean_yaw_env.kernel.compilation import inlined
+from lean_yaw_env.kernel.contact import worst_contact
 from lean_yaw_env.kernel.elementary import sine_cosine
 from lean_yaw_env.kernel.records import (
     BACKWARD,
@@ -25,7 +26,7 @@ from lean_yaw_env.kernel.records import (
 )
 from lean_yaw_env.kernel.stance import (
     accelerations,
-    accelerations_and_contact,
+    accelerations_and_forces,
     mass_matrix,
     mass_offset,
     middle_of_masses,
@@ -155,7 +156,8 @@ def is_collapsing(stance, time, sin_a, cos_a, sin_twist, cos_twist, upright):
 def stance_step(c, t, x, b, w, v, dw1, dv1, h):
     """One step of Verner's pair for pitch x, twist b and their rates w, v.
 
-    Returns the new coordinates and rates, the largest error estimate, the damping's loss, and contact forces within the step.
+    Returns the new coordinates and rates, the largest error estimate, the damping's loss, and, at stages 7, 6 and 9, the normal force and
+    the square of the tangential one.
     """
     # fmt: off
     w2 = verner.stage_2(w, h, dw1)
@@ -178,12 +180,12 @@ def stance_step(c, t, x, b, w, v, dw1, dv1, h):
     v6 = verner.stage_6(v, h, dv1, dv4, dv5)
     x6 = verner.stage_6(x, h, w, w4, w5)
     b6 = verner.stage_6(b, h, v, v4, v5)
-    dw6, dv6, normal6, friction6 = accelerations_and_contact(c, t + verner.C6 * h, x6, b6, w6, v6)
+    dw6, dv6, normal6, square6 = accelerations_and_forces(c, t + verner.C6 * h, x6, b6, w6, v6)
     w7 = verner.stage_7(w, h, dw1, dw4, dw5, dw6)
     v7 = verner.stage_7(v, h, dv1, dv4, dv5, dv6)
     x7 = verner.stage_7(x, h, w, w4, w5, w6)
     b7 = verner.stage_7(b, h, v, v4, v5, v6)
-    dw7, dv7, normal7, friction7 = accelerations_and_contact(c, t + verner.C7 * h, x7, b7, w7, v7)
+    dw7, dv7, normal7, square7 = accelerations_and_forces(c, t + verner.C7 * h, x7, b7, w7, v7)
     w8 = verner.stage_8(w, h, dw1, dw4, dw5, dw6, dw7)
     v8 = verner.stage_8(v, h, dv1, dv4, dv5, dv6, dv7)
     dw8, dv8 = accelerations(
@@ -193,7 +195,7 @@ def stance_step(c, t, x, b, w, v, dw1, dv1, h):
     v9 = verner.stage_9(v, h, dv1, dv4, dv5, dv6, dv7, dv8)
     x9 = verner.stage_9(x, h, w, w4, w5, w6, w7, w8)
     b9 = verner.stage_9(b, h, v, v4, v5, v6, v7, v8)
-    dw9, dv9, normal9, friction9 = accelerations_and_contact(c, t + verner.C9 * h, x9, b9, w9, v9)
+    dw9, dv9, normal9, square9 = accelerations_and_forces(c, t + verner.C9 * h, x9, b9, w9, v9)
     w10 = verner.stage_10(w, h, dw1, dw4, dw5, dw6, dw7, dw8, dw9)
     v10 = verner.stage_10(v, h, dv1, dv4, dv5, dv6, dv7, dv8, dv9)
     dw10, dv10 = accelerations(
@@ -228,8 +230,8 @@ def stance_step(c, t, x, b, w, v, dw1, dv1, h):
         verner.result(w, h, dw1, dw6, dw7, dw8, dw9, dw10, dw11, dw12),
         verner.result(v, h, dv1, dv6, dv7, dv8, dv9, dv10, dv11, dv12),
         error, loss,
-        min(min(normal6.real, normal7.real), normal9.real),
-        max(max(friction6.real, friction7.real), friction9.real),
+        (normal7.real, normal6.real, normal9.real),
+        (square7.real, square6.real, square9.real),
     )
     # fmt: on
 
@@ -238,13 +240,13 @@ def stance_step(c, t, x, b, w, v, dw1, dv1, h):
 def advance(stance, flight):
     """Try one integrator step; accept, shorten or repeat it, and say whether the walker lands or falls."""
     h = flight.next_step
-    pitch, twist, pitch_rate, twist_rate, error, loss, normal, friction = stance_step(
+    pitch, twist, pitch_rate, twist_rate, error, loss, normals, squares = stance_step(
         stance, flight.time, flight.pitch, flight.twist, flight.pitch_rate, flight.twist_rate,
         flight.pitch_acceleration, flight.twist_acceleration, h,
     )  # fmt: skip
     time = flight.time + h
     now = time.real
-    pitch_acceleration, twist_acceleration, normal_here, friction_here = accelerations_and_contact(
+    pitch_acceleration, twist_acceleration, normal, square = accelerations_and_forces(
         stance, time, pitch, twist, pitch_rate, twist_rate
     )
     sin_a, cos_a = sine_cosine(pitch + stance.tilt)
@@ -280,8 +282,12 @@ def advance(stance, flight):
     onward = landing if landed else onward
     next_step = onward if accepted else shorter
 
-    least = min(flight.least_normal_force, min(normal, normal_here.real))
-    most = max(flight.friction_squared, max(friction, friction_here.real))
+    least, most = worst_contact(
+        (flight.normal_force, normals[0], normals[1], normals[2], normal.real),
+        (flight.tangential_squared, squares[0], squares[1], squares[2], square.real),
+    )
+    least = min(flight.least_normal_force, least)
+    most = max(flight.friction_squared, most)
     attempts = flight.attempts + 1.0
     rolls_back = is_rolling_back(pitch_rate, pitch_acceleration) & (not shifting)
     status = FAILED if attempts >= MOST_ATTEMPTS else FLYING
@@ -305,6 +311,8 @@ def advance(stance, flight):
         gap_rate if accepted else flight.gap_rate,
         gap_acceleration if accepted else flight.gap_acceleration,
         next_step,
+        normal.real if accepted else flight.normal_force,
+        square.real if accepted else flight.tangential_squared,
         least if accepted else flight.least_normal_force,
         most if accepted else flight.friction_squared,
         flight.damping_loss + loss if accepted else flight.damping_loss,

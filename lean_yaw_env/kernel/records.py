@@ -83,6 +83,8 @@ class Flight(NamedTuple):
     gap_rate: float
     gap_acceleration: float
     next_step: float
+    normal_force: float
+    tangential_squared: float
     least_normal_force: float
     friction_squared: float
     damping_loss: float

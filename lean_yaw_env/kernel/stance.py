@@ -147,10 +147,19 @@ def floor_force(stance, time, pitch, twist, pitch_rate, twist_rate):
 
 
 @inlined
+def accelerations_and_forces(stance, time, pitch, twist, pitch_rate, twist_rate):
+    """Angular accelerations, normal force, and the square of the tangential force."""
+    dw, dv, ahead, normal, aside = floor_force(stance, time, pitch, twist, pitch_rate, twist_rate)
+    return dw, dv, normal, ahead * ahead + aside * aside
+
+
+@inlined
 def accelerations_and_contact(stance, time, pitch, twist, pitch_rate, twist_rate):
     """Angular accelerations, normal force, and the squared ratio of tangential to normal force."""
-    dw, dv, ahead, normal, aside = floor_force(stance, time, pitch, twist, pitch_rate, twist_rate)
-    return dw, dv, normal, (ahead * ahead + aside * aside) / (normal * normal)
+    dw, dv, normal, square = accelerations_and_forces(
+        stance, time, pitch, twist, pitch_rate, twist_rate
+    )
+    return dw, dv, normal, square / (normal * normal)
 
 
 @inlined

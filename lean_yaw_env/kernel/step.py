@@ -36,7 +36,7 @@ from lean_yaw_env.kernel.records import (
 )
 from lean_yaw_env.kernel.stance import (
     accelerations,
-    accelerations_and_contact,
+    accelerations_and_forces,
     kinetic_energy,
     mass_matrix,
     mass_offset,
@@ -85,9 +85,10 @@ def start(stance, body, pitch, twist, pitch_rate, twist_rate):
     sin_a, cos_a = sine_cosine(pitch + stance.tilt)
     sin_twist, cos_twist = sine_cosine(twist)
     time = 0.0 * pitch
-    dw, dv, normal, friction = accelerations_and_contact(
+    dw, dv, normal, square = accelerations_and_forces(
         stance, time, pitch, twist, pitch_rate, twist_rate
     )
+    friction = square / (normal * normal)
     gap, gap_rate, gap_acceleration, upright = foot_gap(
         stance, sin_a, cos_a, sin_twist, cos_twist, pitch_rate, twist_rate, dw, dv
     )
@@ -109,7 +110,7 @@ def start(stance, body, pitch, twist, pitch_rate, twist_rate):
     status = LIFT_OFF if normal.real <= 0.0 else status
     return Flight(
         time, pitch, twist, pitch_rate, twist_rate, dw, dv, gap, gap_rate, gap_acceleration,
-        0.0 if strikes else first, normal.real, friction.real, time, 1.0, 0.0, status,
+        0.0 if strikes else first, normal.real, square.real, normal.real, friction.real, time, 1.0, 0.0, status,
         pitch, twist, kinetic_energy(m11, m12, m22, pitch_rate, twist_rate),
     )  # fmt: skip
 
