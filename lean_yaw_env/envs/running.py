@@ -7,7 +7,7 @@ import numpy as np
 from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.transition import begin, command, move, observe, push, veil
 from lean_yaw_env.kernel.batch import step_batch
-from lean_yaw_env.kernel.compilation import inlined
+from lean_yaw_env.kernel.compilation import borrowed, inlined
 from lean_yaw_env.kernel.records import FAILED, Command
 from lean_yaw_env.kernel.step import body_of, walking_step, write_outcome
 
@@ -54,6 +54,9 @@ def run_one(
     task_reward, task_features,
 ):  # fmt: skip
     """One walker's environment step, through the scalar kernel; return ``DONE``, ``NOT_A_NUMBER`` or ``FAILURE``."""
+    memory, stream, settings = borrowed(memory), borrowed(stream), borrowed(settings)
+    actions, outcomes, observations = borrowed(actions), borrowed(outcomes), borrowed(observations)
+    rewards, terminated, truncated = borrowed(rewards), borrowed(terminated), borrowed(truncated)
     if not (np.isfinite(actions[0, 0]) and np.isfinite(actions[0, 1])):
         return NOT_A_NUMBER
     command(memory, settings, actions, 0)
@@ -79,6 +82,10 @@ def run_many(
 
     Those to skip stay as they are: in their place in the batch the gait is stepped, and its outcome dropped.
     """
+    memory, stream, settings = borrowed(memory), borrowed(stream), borrowed(settings)
+    actions, outcomes, observations = borrowed(actions), borrowed(outcomes), borrowed(observations)
+    rewards, terminated, truncated = borrowed(rewards), borrowed(terminated), borrowed(truncated)
+    commands, states, sides = borrowed(commands), borrowed(states), borrowed(sides)
     for i in range(first, last):
         if skip[i]:
             commands[i, 0] = settings[c.BASE_ANGLE]
