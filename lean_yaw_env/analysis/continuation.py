@@ -172,20 +172,16 @@ def continue_gait(
     step, ended = min(_FIRST_STEP, longest_step), "the asked number of points"
     with Counter("continuation", progress) as counter:
         while len(points) < most_points:
-            following, step, why = _next_point(curve, points[-1], step, longest_step)
+            following, step, why = _next_point(curve, points[-1], step, longest_step, (low, high))
             if following is None:
                 ended = why
-                break
-            here = curve.value(following)
-            if not low <= here <= high:
-                edge = _edge(curve, points[-1], following, low if here < low else high)
-                events.extend(_events(curve, points[-1], edge))
-                points.append(edge)
-                ended = f"{parameter} reached {curve.value(edge):g}"
                 break
             events.extend(_events(curve, points[-1], following))
             points.append(following)
             counter.advance()
+            if curve.value(following) in (low, high):
+                ended = f"{parameter} reached {curve.value(following):g}"
+                break
     return Branch(
         parameter=parameter,
         values=np.array([curve.value(p) for p in points]),
@@ -206,6 +202,8 @@ class _Point:
     tangent: Vector
     eigenvalues: NDArray[np.complex128]
     iterations: int
+    limit: float | None = None
+    """The parameter's value, where it is a limit that rounding must not pass."""
 
 
 @dataclass(frozen=True)
@@ -222,16 +220,16 @@ class _Curve:
         return np.append(np.full(len(self.section_map.free), STATE_SCALE), self.parameter_scale)
 
     def value(self, point: _Point) -> float:
-        return float(point.place[-1] * self.parameter_scale)
+        return float(point.place[-1] * self.parameter_scale) if point.limit is None else point.limit
 
     def state(self, place: Vector) -> Vector:
         state = self.template.copy()
         state[self.section_map.free] = (place * self.scales)[:-1]
         return state
 
-    def equations(self, place: Vector) -> tuple[Vector, Vector, Vector]:
+    def equations(self, place: Vector, limit: float | None) -> tuple[Vector, Vector, Vector]:
         """Residual (m,), its scaled derivative (m, m + 1), and the map's own Jacobian (m, m)."""
-        value = float(place[-1] * self.parameter_scale)
+        value = float(place[-1] * self.parameter_scale) if limit is None else limit
         moved = self.section_map.moved(self.parameter, value)
         free, state = self.section_map.free, self.state(place)
         image, matrix, by_parameter = moved.sensitivity(state, self.parameter)
@@ -246,10 +244,12 @@ class _Curve:
         )
         along = np.zeros(place.size)
         along[-1] = direction
-        return self.corrected(place, along)
+        return self.corrected(place, along, self.section_map.value(self.parameter))
 
-    def corrected(self, place: Vector, along: Vector) -> _Point:
+    def corrected(self, place: Vector, along: Vector, limit: float | None = None) -> _Point:
         """The branch's point in the plane through ``place`` square to ``along``.
+
+        With ``limit``, ``along`` is along the parameter, which has that value in the plane.
 
         Raises
         ------
@@ -258,14 +258,14 @@ class _Curve:
         """
         anchor = place
         for iteration in range(_NEWTON_STEPS):
-            residual, slope, own = self.equations(place)
+            residual, slope, own = self.equations(place, limit)
             bordered = np.vstack([slope, along])
             if iteration > 0 and float(np.abs(residual).max()) < _RESIDUAL:
                 tangent = np.linalg.solve(bordered, np.append(np.zeros(residual.size), 1.0))
                 eigenvalues = np.asarray(np.linalg.eigvals(own), dtype=complex)
                 order = np.lexsort((-np.imag(eigenvalues), -np.abs(eigenvalues)))
                 return _Point(
-                    place, tangent / np.linalg.norm(tangent), eigenvalues[order], iteration
+                    place, tangent / np.linalg.norm(tangent), eigenvalues[order], iteration, limit
                 )
             miss = np.append(residual, along @ (place - anchor))
             place = place - np.linalg.solve(bordered, miss)
@@ -277,13 +277,13 @@ class _Curve:
 
 
 def _next_point(
-    curve: _Curve, point: _Point, step: float, longest: float
+    curve: _Curve, point: _Point, step: float, longest: float, limits: tuple[float, float]
 ) -> tuple[_Point | None, float, str]:
     """The next point with the step to try after it, or None and why the branch ends."""
     why = ""
     while step >= _SMALLEST_STEP:
         try:
-            found = curve.beyond(point, step)
+            found = _attempt(curve, point, step, limits)
         except (LeanYawError, ValueError, np.linalg.LinAlgError) as error:
             why, step = str(error), 0.5 * step
             continue
@@ -295,15 +295,19 @@ def _next_point(
     return None, step, why
 
 
-def _edge(curve: _Curve, point: _Point, following: _Point, limit: float) -> _Point:
-    """The point between two at which the parameter has the value ``limit``."""
-
-    def beyond(length: float) -> float:
-        return curve.value(curve.beyond(point, length)) - limit
-
-    whole = float((following.place - point.place) @ point.tangent)
-    length = float(brentq(beyond, 0.0, whole, xtol=1e-13))  # pyright: ignore[reportArgumentType]
-    return curve.beyond(point, length)
+def _attempt(curve: _Curve, point: _Point, step: float, limits: tuple[float, float]) -> _Point:
+    """The point a step further, or on the parameter's limit where the step would go beyond."""
+    ahead = float(point.place[-1] + step * point.tangent[-1]) * curve.parameter_scale
+    limit = min(max(ahead, limits[0]), limits[1])
+    if limit == ahead:
+        found = curve.beyond(point, step)
+        if not limits[0] <= curve.value(found) <= limits[1]:
+            raise NoGaitError("the branch leaves the interval")
+        return found
+    length = (limit / curve.parameter_scale - point.place[-1]) / point.tangent[-1]
+    along = np.zeros(point.place.size)
+    along[-1] = np.sign(point.tangent[-1])
+    return curve.corrected(point.place + length * point.tangent, along, limit)
 
 
 def _fold_test(point: _Point) -> float:

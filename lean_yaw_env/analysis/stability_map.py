@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lean_yaw_env.analysis.fixed_point import solve_fixed_point
+from lean_yaw_env.analysis.fixed_point import follow_fixed_point, solve_fixed_point
 from lean_yaw_env.analysis.gait_grid import GridGaits, WalkerGrid, follow_grid, solve_grid
 from lean_yaw_env.analysis.limit_cycle import cycle_at, find_limit_cycle, planar_gait_rate
 from lean_yaw_env.analysis.passive_search import search_passive
@@ -298,8 +298,8 @@ class _PassiveSearch:
         for i in index:
             values["status"][i] = NONE_FOUND
             start = self._planar(self._maps[i].walker)
-            if start is not None:
-                self._try(int(i), start, values)
+            if start is not None and not self._try(int(i), start, values):
+                self._follow(int(i), start, values)
 
     def spread(self, index: NDArray[np.intp], guesses: Vector, values: dict[str, Vector]) -> int:
         """Try some points from guesses; how many were found."""
@@ -316,6 +316,21 @@ class _PassiveSearch:
             except NoGaitError:
                 self._flat[key] = None
         return self._flat[key]
+
+    def _follow(self, i: int, start: Vector, values: dict[str, Vector]) -> None:
+        """From no hip width: lean grows fast with it, and Newton's method loses its way."""
+        width = self._maps[i].value("hip_width")
+        if width == 0.0:
+            return
+
+        def path(share: float) -> PassiveMap:
+            return self._maps[i].moved("hip_width", share * width)
+
+        try:
+            _, state = follow_fixed_point(path, start)
+        except NoGaitError:
+            return
+        self._try(i, state, values)
 
     def _try(self, i: int, guess: Vector, values: dict[str, Vector]) -> bool:
         try:
