@@ -20,6 +20,9 @@ TASK_VERSIONS = {
 
 ENV_IDS = tuple(f"{NAMESPACE}/{name}-v{version}" for name, version in TASK_VERSIONS.items())
 
+GOAL_ENV_ID = f"{NAMESPACE}/WaypointGoal-v0"
+"""Waypoint for goal-conditioned learners: the one environment whose observations are dictionaries."""
+
 
 def register_envs() -> None:
     """Register every environment that is not registered yet; calling it again does nothing."""
@@ -31,3 +34,5 @@ def register_envs() -> None:
                 vector_entry_point="lean_yaw_env.envs.vector_env:WalkerVectorEnv",
                 kwargs={"task": name},
             )
+    if GOAL_ENV_ID not in registry:
+        register(id=GOAL_ENV_ID, entry_point="lean_yaw_env.envs.goal_env:WaypointGoalEnv")

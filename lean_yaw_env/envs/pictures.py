@@ -8,7 +8,7 @@ from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.rows import WalkerRows
 from lean_yaw_env.parameters import STATE_SIZE, Foot, Vector
 from lean_yaw_env.rendering.geometry import Pose, walker_shape
-from lean_yaw_env.rendering.scene import Scene, status_lines
+from lean_yaw_env.rendering.scene import Goal, Scene, status_lines
 
 
 class Footage:
@@ -23,6 +23,7 @@ class Footage:
         self._headings: list[float] = []
         self._feet: list[Foot] = []
         self._path: list[Vector] = []
+        self._goal_places: list[tuple[float, float]] = []
         self.extend()
 
     def extend(self) -> None:
@@ -33,10 +34,16 @@ class Footage:
         self._feet.append(self._foot())
         centre = walker_shape(self._rows.body_parameters(0), self._pose()).centre
         self._path.append(centre[[0, 2]])
+        columns = self._rows.task.goal_columns
+        if columns is not None:
+            place = (float(memory[columns[0]]), float(memory[columns[1]]))
+            if place not in self._goal_places[-1:]:
+                self._goal_places.append(place)
 
     def scene(self, fall: str | None) -> Scene:
         memory = self._rows.memory[0]
-        column = self._rows.task.command_column
+        task = self._rows.task
+        column = task.command_column
         command = None if column is None else float(memory[column])
         return Scene(
             parameters=self._rows.body_parameters(0),
@@ -46,6 +53,8 @@ class Footage:
             feet=tuple(self._feet),
             path=np.array(self._path),
             commanded_heading=command,
+            goals=self._goals(),
+            reference_path=None if task.reference_path is None else task.reference_path(memory),
             lines=status_lines(
                 step=int(memory[c.STEPS]),
                 time=float(memory[c.TIME]),
@@ -55,6 +64,13 @@ class Footage:
                 status="walking" if fall is None else f"fell {fall}",
             ),
         )
+
+    def _goals(self) -> list[Goal]:
+        """The goals reached so far, and the one in force."""
+        return [
+            Goal(x, z, self._rows.task.goal_radius, reached=k < len(self._goal_places) - 1)
+            for k, (x, z) in enumerate(self._goal_places)
+        ]
 
     def _foot(self) -> Foot:
         return "left" if self._rows.memory[0, c.SIDE] > 0.0 else "right"

@@ -13,6 +13,7 @@ SURVIVED = c.TASK
 
 TRIAL = 200  # steps
 PUSH_LEVEL = 0.5
+LARGEST_CHANGE = 0.1  # of the offset: what tells from a gentle one how hard a push can be met
 
 
 @inlined
@@ -69,5 +70,6 @@ TASK = Task(
     reward=f"{WALKING_RATE} - {EFFORT_RATE} effort",
     history=("0: the first.",),
     horizon=300.0,
+    max_offset_change=LARGEST_CHANGE,
     push_level=PUSH_LEVEL,
 )
