@@ -1,6 +1,9 @@
 """Gaits and their stability: stride map, limit cycles, modes, branches, maps, basins, demands."""
 
+from lean_yaw_env.analysis.basin import Disturbance, basin, largest_disturbance
 from lean_yaw_env.analysis.continuation import Branch, Event, continue_gait
+from lean_yaw_env.analysis.critical_speed import stable_speeds
+from lean_yaw_env.analysis.floor_demand import FloorDemand, StepDemand, floor_demand
 from lean_yaw_env.analysis.limit_cycle import (
     LimitCycle,
     find_gait,
@@ -17,6 +20,8 @@ from lean_yaw_env.analysis.section_map import (
     PassiveMap,
     section_map_of,
 )
+from lean_yaw_env.analysis.stability_map import load_map, save_map, stability_map
+from lean_yaw_env.analysis.storage import load_dataset, save_dataset
 from lean_yaw_env.analysis.stride import StrideJacobian, stride_jacobian, stride_map
 
 __all__ = [
@@ -24,19 +29,31 @@ __all__ = [
     "COMMAND_PARAMETERS",
     "ActiveMap",
     "Branch",
+    "Disturbance",
     "Event",
+    "FloorDemand",
     "LimitCycle",
     "Mode",
     "PassiveMap",
+    "StepDemand",
     "StrideJacobian",
+    "basin",
     "continue_gait",
     "find_gait",
     "find_limit_cycle",
     "find_passive_gaits",
     "find_periodic_gait",
+    "floor_demand",
+    "largest_disturbance",
+    "load_dataset",
+    "load_map",
     "modes",
     "planar_gait_rate",
+    "save_dataset",
+    "save_map",
     "section_map_of",
+    "stability_map",
+    "stable_speeds",
     "stride_jacobian",
     "stride_map",
 ]

@@ -48,6 +48,9 @@ NUMBERS = (
 )
 """One value at each point: the largest multiplier's magnitude, and fields of ``LimitCycle``."""
 
+Columns = dict[str, NDArray[Any]]
+"""A map's variables while it is made, one row for each point."""
+
 _CHUNK = 256
 _NEAR = 0.1
 """A gait found from a neighbour's is its continuation if no coordinate differs by more."""
@@ -158,11 +161,9 @@ def _grid_maps(
     return maps
 
 
-def _empty(
-    section_map: ActiveMap | PassiveMap, axes: Mapping[str, Any], n: int
-) -> dict[str, Vector]:
+def _empty(section_map: ActiveMap | PassiveMap, axes: Mapping[str, Any], n: int) -> Columns:
     modes = 3 if _is_planar(section_map) else len(section_map.names)
-    values: dict[str, Vector] = {name: np.full(n, np.nan) for name in NUMBERS}
+    values: Columns = {name: np.full(n, np.nan) for name in NUMBERS}
     values["status"] = np.full(n, NOT_YET, dtype=np.int8)
     values["state"] = np.full((n, len(section_map.names)), np.nan)
     values["eigenvalue_real"] = np.full((n, modes), np.nan)
@@ -182,7 +183,7 @@ def _flat(variable: xarray.DataArray, n_axes: int) -> Vector:
 def _dataset(
     section_map: ActiveMap | PassiveMap,
     axes: Mapping[str, Sequence[float] | Vector],
-    values: dict[str, Vector],
+    values: Columns,
 ) -> xarray.Dataset:
     names = list(axes)
     coordinates = {name: np.asarray(axis, dtype=float) for name, axis in axes.items()}
@@ -223,7 +224,7 @@ class _ActiveSearch:
         )
         self._maps = maps
 
-    def begin(self, index: NDArray[np.intp], values: dict[str, Vector]) -> None:
+    def begin(self, index: NDArray[np.intp], values: Columns) -> None:
         """Follow the gaits of some points from no hip width and no offset."""
         rates = [
             planar_gait_rate(self._maps[i].walker, self._maps[i].inter_leg_angle) for i in index
@@ -241,7 +242,7 @@ class _ActiveSearch:
         for i in pumped[: 1 if pumped.size else 0]:
             self._seed(int(i), values)
 
-    def spread(self, index: NDArray[np.intp], guesses: Vector, values: dict[str, Vector]) -> int:
+    def spread(self, index: NDArray[np.intp], guesses: Vector, values: Columns) -> int:
         """Try some points from guesses; how many were found."""
         gaits = solve_grid(self._grid.at(index), guesses, threads=self._threads)
         near = gaits.found & (np.abs(np.nan_to_num(gaits.states - guesses)).max(axis=1) < _NEAR)
@@ -249,7 +250,7 @@ class _ActiveSearch:
         self._write(index, gaits, values)
         return int(near.sum())
 
-    def _seed(self, i: int, values: dict[str, Vector]) -> None:
+    def _seed(self, i: int, values: Columns) -> None:
         """Where pumping alone drives the walker: one gait, from which neighbours are found."""
         try:
             cycle = find_limit_cycle(
@@ -261,7 +262,7 @@ class _ActiveSearch:
             return
         self.spread(np.array([i]), cycle.state[None], values)
 
-    def _write(self, index: NDArray[np.intp], gaits: GridGaits, values: dict[str, Vector]) -> None:
+    def _write(self, index: NDArray[np.intp], gaits: GridGaits, values: Columns) -> None:
         some = index[gaits.found]
         if not some.size:
             return
@@ -293,7 +294,7 @@ class _PassiveSearch:
         self._maps = [m for m in maps if isinstance(m, PassiveMap)]
         self._flat: dict[tuple[float, float], Vector | None] = {}
 
-    def begin(self, index: NDArray[np.intp], values: dict[str, Vector]) -> None:
+    def begin(self, index: NDArray[np.intp], values: Columns) -> None:
         """Start each point from the planar gait of the long period."""
         for i in index:
             values["status"][i] = NONE_FOUND
@@ -301,7 +302,7 @@ class _PassiveSearch:
             if start is not None and not self._try(int(i), start, values):
                 self._follow(int(i), start, values)
 
-    def spread(self, index: NDArray[np.intp], guesses: Vector, values: dict[str, Vector]) -> int:
+    def spread(self, index: NDArray[np.intp], guesses: Vector, values: Columns) -> int:
         """Try some points from guesses; how many were found."""
         return sum(
             self._try(int(i), guess, values) for i, guess in zip(index, guesses, strict=True)
@@ -317,7 +318,7 @@ class _PassiveSearch:
                 self._flat[key] = None
         return self._flat[key]
 
-    def _follow(self, i: int, start: Vector, values: dict[str, Vector]) -> None:
+    def _follow(self, i: int, start: Vector, values: Columns) -> None:
         """From no hip width: lean grows fast with it, and Newton's method loses its way."""
         width = self._maps[i].value("hip_width")
         if width == 0.0:
@@ -332,7 +333,7 @@ class _PassiveSearch:
             return
         self._try(i, state, values)
 
-    def _try(self, i: int, guess: Vector, values: dict[str, Vector]) -> bool:
+    def _try(self, i: int, guess: Vector, values: Columns) -> bool:
         try:
             state = solve_fixed_point(self._maps[i], guess)
         except NoGaitError:
@@ -348,7 +349,7 @@ class _PassiveSearch:
         return True
 
 
-def _write_eigenvalues(i: int, eigenvalues: NDArray[Any], values: dict[str, Vector]) -> None:
+def _write_eigenvalues(i: int, eigenvalues: NDArray[Any], values: Columns) -> None:
     order = np.lexsort((-np.imag(eigenvalues), -np.abs(eigenvalues)))
     n = eigenvalues.size
     values["eigenvalue_real"][i, :n] = np.real(eigenvalues)[order]
@@ -357,7 +358,7 @@ def _write_eigenvalues(i: int, eigenvalues: NDArray[Any], values: dict[str, Vect
 
 
 def _spread(
-    search: _ActiveSearch | _PassiveSearch, values: dict[str, Vector], shape: tuple[int, ...]
+    search: _ActiveSearch | _PassiveSearch, values: Columns, shape: tuple[int, ...]
 ) -> bool:
     """Try points without a gait from neighbours that have just got one; whether any was found."""
     status = values["status"].reshape(shape)

@@ -1,0 +1,79 @@
+"""The walker's critical speed, with the meaning that skateboard and bicycle give it.
+
+A walker's speed is not a parameter: the slope sets it. So the gait is followed along the slope, and
+the speeds are those between which it is stable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from lean_yaw_env.analysis.continuation import Branch, continue_gait
+from lean_yaw_env.analysis.limit_cycle import cycle_at, find_limit_cycle
+from lean_yaw_env.errors import NoGaitError
+from lean_yaw_env.parameters import INTER_LEG_ANGLE
+from lean_yaw_env.vehicles.stability import SpeedRange, stable_speed_range
+from lean_yaw_env.walker import Walker
+
+LEAST_SLOPE, GREATEST_SLOPE = 1e-5, 0.3
+"""Between which slopes the gait is looked for, rad."""
+_TRIED = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25)
+"""Slopes at which a stable gait is looked for, the gentlest first."""
+
+
+def stable_speeds(walker: Walker, *, inter_leg_angle: float = INTER_LEG_ANGLE) -> SpeedRange | None:
+    """Find the lowest range of speeds in which a walker's straight gait is stable.
+
+    Parameters
+    ----------
+    walker : Walker
+        Its slope plays no part.
+    inter_leg_angle : (0, pi/2)
+
+    Returns
+    -------
+    SpeedRange or None
+        In leg lengths per unit of time. The upper end is the speed at which the gait loses its
+        stability or ceases (it lifts off); ``inf`` if neither happens up to a slope of 0.3. None
+        if no gait on the slopes tried is stable.
+    """
+    for slope in _TRIED:
+        here = Walker(replace(walker.parameters, slope=slope))
+        try:
+            cycle = find_limit_cycle(here, inter_leg_angle=inter_leg_angle)
+        except NoGaitError:
+            continue
+        if not cycle.is_stable:
+            continue
+        down, up = (
+            continue_gait(
+                here,
+                "slope",
+                (LEAST_SLOPE, GREATEST_SLOPE),
+                state=cycle.state,
+                inter_leg_angle=inter_leg_angle,
+                upward=upward,
+                longest_step=0.02,
+            )
+            for upward in (False, True)
+        )
+        lower = _end_speed(down)
+        upper = _end_speed(up)
+        return SpeedRange(0.0 if lower is None else lower, float("inf") if upper is None else upper)
+    return None
+
+
+def _end_speed(branch: Branch) -> float | None:
+    """The speed at which stability, or the gait itself, ends; None if at neither."""
+    for event in branch.events:
+        if event.is_leaving:
+            moved = branch.section_map.moved(branch.parameter, event.value)
+            return cycle_at(moved, event.state).speed
+    if branch.values[-1] in (LEAST_SLOPE, GREATEST_SLOPE):
+        return None
+    return branch.cycle(-1).speed
+
+
+@stable_speed_range.register
+def _(walker: Walker) -> SpeedRange | None:
+    return stable_speeds(walker)
