@@ -13,7 +13,7 @@ from lean_yaw_env.kernel.compilation import inlined
 _TURN = 2.0 * pi
 
 # sin(x) = x + x z P(z) and cos(x) = 1 + z Q(z) with z = x^2, for half of an angle between -pi and pi. P and Q are the polynomials whose
-# largest error there is least (2e-16 and 6e-18), found by Chebyshev's method in 40 digits.
+# own largest error there is least (2e-16 and 6e-18), found by Chebyshev's method in 40 digits.
 _S3, _S5, _S7, _S9, _S11, _S13, _S15 = (
     -0.1666666666666665,
     0.008333333333325924,
@@ -40,7 +40,7 @@ _T0, _T1, _T2, _T3, _T4 = 0.9998660, -0.3302995, 0.1801410, -0.0851330, 0.020835
 
 @inlined
 def sine_cosine(angle):
-    """Sine and cosine of an angle between -pi and pi, to 4e-16."""
+    """Sine and cosine of an angle between -pi and pi, to 4e-16 within a quarter turn and 4e-15 beyond."""
     half = 0.5 * angle
     z = half * half
     # fmt: off
