@@ -1,0 +1,140 @@
+"""A number or statement of the paper set beside ours, with a verdict."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from lean_yaw_env.paper.numbers import PaperNumber, Statement
+
+Verdict = Literal["agrees", "agrees within rounding", "differs", "open"]
+VERDICTS: tuple[Verdict, ...] = ("agrees", "agrees within rounding", "differs", "open")
+"""What a check can come to.
+
+``agrees``: the statement holds, or the number is within what the paper's "about" is taken to allow.
+``agrees within rounding``: ours, rounded to the printed digits, is the printed number.
+``differs``: it is not, and the remark says why, or what both are. ``open``: it is not, and nobody
+knows why.
+"""
+
+_ROUND_OFF = 1e-9
+
+
+@dataclass(frozen=True)
+class Check:
+    """One row of the report.
+
+    Attributes
+    ----------
+    name : str
+        Unique within its piece.
+    where : str
+        The place in the paper.
+    statement : str
+        What the number is, or what the paper says.
+    paper, ours : str
+        As printed; ours with more digits.
+    difference : float or None
+        Ours less the paper's, where both are numbers.
+    verdict : Verdict
+    remark : str
+        A plain sentence; never empty where the two disagree.
+    """
+
+    name: str
+    where: str
+    statement: str
+    paper: str
+    ours: str
+    difference: float | None
+    verdict: Verdict
+    remark: str = ""
+
+    def __post_init__(self) -> None:
+        if self.verdict not in VERDICTS:
+            raise ValueError(f"verdict must be one of {', '.join(VERDICTS)}; not {self.verdict!r}")
+        if not self.agrees and not self.remark:
+            raise ValueError(f"check {self.name!r} disagrees, which needs a remark that says how")
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the paper and we say the same."""
+        return self.verdict in ("agrees", "agrees within rounding")
+
+
+def compare(
+    number: PaperNumber, ours: float, *, remark: str = "", unless: str = "", is_open: bool = False
+) -> Check:
+    """Compare a number with the printed one.
+
+    Parameters
+    ----------
+    number : PaperNumber
+    ours : float
+        In the paper's unit; nan where we find none.
+    remark : str
+        Said in any case.
+    unless : str
+        Said if the two disagree; the fallback names both numbers only.
+    is_open : bool
+        Whether a disagreement is unexplained.
+    """
+    difference = ours - number.value
+    if abs(difference) <= number.half_digit * (1.0 + _ROUND_OFF):
+        verdict: Verdict = "agrees within rounding"
+    elif number.about and abs(difference) <= number.about * abs(number.value):
+        verdict = "agrees"
+    else:
+        verdict = "open" if is_open else "differs"
+    sentences = [remark] if remark else []
+    if verdict == "agrees":
+        sentences.append(f"The paper's number is approximate; {number.about:.0%} is allowed here.")
+    if verdict in ("differs", "open"):
+        sentences.append(unless or f"The paper has {number.printed}, we find {ours:.5g}.")
+    return Check(
+        name=number.name,
+        where=number.where,
+        statement=number.meaning,
+        paper=number.printed,
+        ours="none found" if math.isnan(ours) else significant(ours, number),
+        difference=None if math.isnan(ours) else difference,
+        verdict=verdict,
+        remark=" ".join(sentences),
+    )
+
+
+def judge(
+    statement: Statement, holds: bool, *, ours: str, remark: str = "", is_open: bool = False
+) -> Check:
+    """Judge a statement that is not one number.
+
+    Parameters
+    ----------
+    statement : Statement
+    holds : bool
+    ours : str
+        What we find, with its numbers.
+    remark : str
+        Needed where it does not hold.
+    is_open : bool
+        Whether a disagreement is unexplained.
+    """
+    return Check(
+        name=statement.name,
+        where=statement.where,
+        statement=statement.meaning,
+        paper=statement.printed,
+        ours=ours,
+        difference=None,
+        verdict="agrees" if holds else "open" if is_open else "differs",
+        remark=remark,
+    )
+
+
+def significant(ours: float, number: PaperNumber) -> str:
+    """Ours with two digits more than are printed; a zero but for round-off as such."""
+    decimals = number.decimals + 2
+    if abs(ours) < _ROUND_OFF:
+        return "0"
+    return f"{ours:.{decimals}f}"

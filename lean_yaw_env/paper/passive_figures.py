@@ -1,0 +1,157 @@
+"""Figures 7 and 8: the passive walkers' legs over a step, and the flat one against ankle tilt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lean_yaw_env.paper import numbers
+from lean_yaw_env.paper.checks import Check, compare, judge
+from lean_yaw_env.paper.drawing import FAINT, name_axes, new_figure
+from lean_yaw_env.paper.multiplier_curves import MultiplierCurves, along_tilt, draw_curves
+from lean_yaw_env.paper.results import Columns, Result
+from lean_yaw_env.paper.walkers import (
+    FlatGait,
+    arc_foot_walker,
+    flat_passive_walker,
+    passive_gait,
+    point_foot_walker,
+)
+from lean_yaw_env.parameters import Vector
+
+_SAMPLES = 121
+_SAME_SPEED = 0.05
+"""What "approximately the same velocity" is taken to allow."""
+_TILTS_8 = (0.13, 0.17)
+_TOP_8 = 1.5
+
+
+@dataclass(frozen=True)
+class LegAngles:
+    """Both legs' pitch over one step of a gait.
+
+    Attributes
+    ----------
+    time : shape (n,)
+    stance, swing : shape (n,)
+        rad from the floor's normal, positive with the foot ahead of the hip.
+    """
+
+    time: Vector
+    stance: Vector
+    swing: Vector
+
+
+def leg_angles(samples: int = _SAMPLES) -> tuple[LegAngles, LegAngles]:
+    """Figure 7: point-foot and arc-foot walker."""
+    found = []
+    for walker in (point_foot_walker(), arc_foot_walker()):
+        gait = passive_gait(walker)
+        motion = walker.motion(gait.state, duration=0.5 * gait.stride_period, samples=samples)
+        stance = motion["stance_pitch"]
+        found.append(LegAngles(motion["time"], stance, stance + motion["inter_leg_angle"]))
+    return found[0], found[1]
+
+
+def draw_leg_angles(points: LegAngles, arcs: LegAngles) -> Any:
+    """Figure 7: point feet solid, arc feet dashed."""
+    figure = new_figure(6.5, 4.4)
+    axes = figure.subplots()
+    for data, style, name in ((points, "k-", "point feet (A)"), (arcs, "k--", "arc feet (B)")):
+        axes.plot(data.time, data.stance, style, linewidth=1.4, label=name)
+        axes.plot(data.time, data.swing, style, linewidth=1.4)
+    axes.axhline(0.0, color=FAINT, linewidth=0.8, linestyle=":")
+    axes.annotate("stance leg", (0.25, 0.16), fontsize=9)
+    axes.annotate("swing leg", (0.25, -0.235), fontsize=9)
+    axes.set_xlim(0.0, 4.0)
+    axes.set_ylim(-0.3, 0.3)
+    axes.legend(loc="upper right", frameon=False)
+    name_axes(axes, "time (leg length / gravity)$^{1/2}$", "leg angle (rad)")
+    return figure
+
+
+def figure_7() -> Result:
+    """Figure 7 with its checks."""
+    points, arcs = leg_angles()
+    gaits = [passive_gait(walker) for walker in (point_foot_walker(), arc_foot_walker())]
+    return Result(
+        checks=_gait_checks(*[(gait.state[1], gait.speed) for gait in gaits]),
+        tables={
+            "figure7": {
+                "model": ["A"] * points.time.size + ["B"] * arcs.time.size,
+                "time": np.concatenate([points.time, arcs.time]),
+                "stance_leg": np.concatenate([points.stance, arcs.stance]),
+                "swing_leg": np.concatenate([points.swing, arcs.swing]),
+            }
+        },
+        picture=draw_leg_angles(points, arcs),
+        caption=(
+            "Leg angles over one step of the passive gaits: point feet at slope 0.004 solid, arc "
+            "feet (radius 0.5) at slope 0.00058 dashed. The swing leg's passing of the floor near "
+            "mid-stance is ignored, as in the paper."
+        ),
+    )
+
+
+def _gait_checks(points: tuple[float, float], arcs: tuple[float, float]) -> tuple[Check, ...]:
+    efficiency = numbers.POINT_FOOT_SLOPE / numbers.PASSIVE_SLOPE
+    apart = abs(arcs[1] / points[1] - 1.0)
+    holds = apart < _SAME_SPEED
+    return (
+        compare(numbers.POINT_FOOT_PITCH, points[0]),
+        compare(numbers.ARC_FOOT_PITCH, arcs[0]),
+        judge(
+            numbers.SAME_VELOCITY,
+            holds,
+            ours=f"A {points[1]:.4f}, B {arcs[1]:.4f}, {apart:.1%} apart",
+            remark="" if holds else f"They are more than {_SAME_SPEED:.0%} apart.",
+        ),
+        compare(
+            numbers.EFFICIENCY,
+            efficiency,
+            remark="Cost of transport is the slope, so this is the ratio of the paper's slopes.",
+        ),
+    )
+
+
+def passive_multipliers(points: int = 801) -> MultiplierCurves:
+    """Figure 8: the flat passive walker at slope 0.00058 against its ankle tilt."""
+    gait = FlatGait.of(flat_passive_walker())
+    return along_tilt(gait, np.linspace(*_TILTS_8, points))
+
+
+def draw_passive_multipliers(curves: MultiplierCurves) -> Any:
+    """Figure 8."""
+    figure = new_figure(6.5, 4.4)
+    axes = figure.subplots()
+    draw_curves(axes, curves, x="ankle joint orientation α (rad)", top=_TOP_8)
+    return figure
+
+
+def figure_8() -> Result:
+    """Figure 8 with its check."""
+    curves = passive_multipliers()
+    low, high = FlatGait.of(flat_passive_walker()).stable_tilts(*_TILTS_8)
+    return Result(
+        checks=(_inside(numbers.STABLE_TILT_PASSIVE, low, high),),
+        tables={"figure8": curves.columns()},
+        picture=draw_passive_multipliers(curves),
+        caption=(
+            "|λ| of the passive flat walker (d = 0, r = 0.5, γ = 0.00058): three-dimensional modes "
+            "solid, fore-aft modes dashed, the stable region shaded. The ranges of the axes are "
+            "ours; the paper's text does not give them."
+        ),
+    )
+
+
+def _inside(number: numbers.PaperNumber, low: float, high: float) -> Check:
+    """Whether a tilt that the paper says is stable is so; its own value is compared too."""
+    holds = low < number.value < high
+    return judge(
+        numbers.Statement(number.name, f"around {number.printed}", number.where, number.meaning),
+        holds,
+        ours=f"stable from {low:.5f} to {high:.5f}",
+        remark="" if holds else f"{number.printed} itself is outside.",
+    )

@@ -1,0 +1,50 @@
+"""What one table, figure or group of claims comes to: checks, columns of numbers, a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from lean_yaw_env.paper.checks import Check
+
+Columns = Mapping[str, Sequence[Any]]
+"""Equally long columns by their headings."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """The reproduction of one piece of the paper.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+    tables : mapping of file stems to columns
+        Written as one CSV file each.
+    picture : matplotlib.figure.Figure or None
+    caption : str
+        What the picture shows and what in it is our choice.
+    """
+
+    checks: tuple[Check, ...] = ()
+    tables: Mapping[str, Columns] = field(default_factory=dict)
+    picture: Any = None
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A table, figure or group of claims that can be reproduced.
+
+    Attributes
+    ----------
+    name : str
+        As given to ``lean-yaw reproduce``.
+    title : str
+    make : function
+        Computes it.
+    """
+
+    name: str
+    title: str
+    make: Callable[[], Result]
