@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,9 +19,7 @@ from lean_yaw_env.parameters import (
     WalkerParameters,
     require_number,
 )
-
-# Below this a thread costs more than it takes over.
-_SMALLEST_SHARE = 256
+from lean_yaw_env.threads import share_out
 
 
 class BatchResult:
@@ -113,19 +110,12 @@ def step_batch(
     if len(bodies) not in (1, n):
         raise ValueError(f"parameters must be one or {n} walkers', not {len(bodies)}")
     outcomes = np.empty((n, len(Outcome._fields)))
-    arguments = (bodies, commands, start, side, outcomes)
-    shares = min(int(require_number("threads", threads, 1, 1024)), max(1, n // _SMALLEST_SHARE))
-    if shares == 1:
-        step_batch_kernel(*arguments, 0, n)
-    else:
-        bounds = np.linspace(0, n, shares + 1).astype(int)
-        with ThreadPoolExecutor(shares) as pool:
-            list(
-                pool.map(
-                    lambda ends: step_batch_kernel(*arguments, *ends),
-                    zip(bounds[:-1], bounds[1:], strict=True),
-                )
-            )
+    workers = int(require_number("threads", threads, 1, 1024))
+    share_out(
+        lambda first, last: step_batch_kernel(bodies, commands, start, side, outcomes, first, last),
+        n,
+        workers,
+    )
     result = BatchResult(outcomes)
     failed = np.flatnonzero(result.statuses == records.FAILED)
     if len(failed):

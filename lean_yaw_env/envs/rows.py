@@ -18,6 +18,7 @@ from lean_yaw_env.kernel import records
 from lean_yaw_env.parameters import (
     MIRROR,
     STATE_SIZE,
+    Vector,
     WalkerParameters,
     require_foot,
     require_number,
@@ -30,6 +31,18 @@ RESET_OPTIONS = ("state", "stance")
 _KEYS = 2**64
 _ODD_COLUMNS = (c.OFFSET, c.COMMANDED_OFFSET, c.PENDING_OFFSET)
 """What changes sign, beside the state, in a mirror image of the start."""
+
+_RESULT_BYTES = 10  # a reward and two ends
+
+
+def _views(buffer: NDArray[np.uint8]) -> tuple[Vector, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Rewards, terminated and truncated, side by side in one buffer."""
+    n = len(buffer) // _RESULT_BYTES
+    return (
+        buffer[: 8 * n].view(np.float64),
+        buffer[8 * n : 9 * n].view(np.bool_),
+        buffer[9 * n :].view(np.bool_),
+    )
 
 
 class WalkerRows:
@@ -48,9 +61,8 @@ class WalkerRows:
         self.actions = np.zeros((n, ACTION_SIZE), dtype=np.float32)
         self.outcomes = np.zeros((n, c.OUTCOMES))
         self.observations = np.zeros((n, len(options.observation_names(task))), dtype=np.float32)
-        self.rewards = np.zeros(n)
-        self.terminated = np.zeros(n, dtype=np.bool_)
-        self.truncated = np.zeros(n, dtype=np.bool_)
+        self._results = np.zeros(n * _RESULT_BYTES, dtype=np.uint8)
+        self.rewards, self.terminated, self.truncated = _views(self._results)
         self.info = InfoTable(task, self.settings)
         self._step_arguments = (
             self.bodies, self.memory, self.stream, self.settings, self.actions, self.outcomes,
@@ -124,6 +136,10 @@ class WalkerRows:
                     require_number(name, value, command.low, command.high) for value in values
                 ]
         return checked
+
+    def results(self) -> tuple[Vector, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Copies of rewards and ends, each (n,), in one fresh buffer."""
+        return _views(self._results.copy())
 
     def step_one(self) -> None:
         """Step row 0 by ``actions``."""

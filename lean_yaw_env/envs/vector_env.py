@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -19,6 +17,7 @@ from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, action_space
 from lean_yaw_env.envs.rows import WalkerRows
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import require_number
+from lean_yaw_env.threads import share_out
 
 Observations = NDArray[np.float32]
 
@@ -85,8 +84,6 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._generators: list[np.random.Generator] | None = None
         self._ended = np.ones(self.num_envs, dtype=np.bool_)
-        self._pool: ThreadPoolExecutor | None = None
-        self._pool_process = 0
 
     def reset(
         self,
@@ -126,26 +123,21 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
             raise gym.error.ResetNeeded(
                 f"walkers {restarts.tolist()} have ended; reset them by options={{'reset_mask': ...}}"
             )
-        bad = ~np.isfinite(chosen).all(axis=1) & ~self._ended
-        if bad.any():
-            raise ValueError(f"actions must be numbers in [-1, 1], not {chosen[bad][0].tolist()}")
+        if not np.isfinite(chosen).all():
+            bad = ~np.isfinite(chosen).all(axis=1) & ~self._ended
+            if bad.any():
+                raise ValueError(
+                    f"actions must be numbers in [-1, 1], not {chosen[bad][0].tolist()}"
+                )
         rows.actions[:] = chosen
         self._walk()
         if len(restarts):
             self._begin(restarts)
         return self._results()
 
-    def close_extras(self, **kwargs: Any) -> None:
-        """Stop the threads."""
-        if self._pool is not None:
-            self._pool.shutdown()
-            self._pool = None
-
     def _results(self) -> tuple[Any, ...]:
         rows = self.rows
-        rewards = rows.rewards.copy()
-        terminated = rows.terminated.copy()
-        truncated = rows.truncated.copy()
+        rewards, terminated, truncated = rows.results()
         np.logical_or(terminated, truncated, out=self._ended)
         final: dict[str, Any] = {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
@@ -219,12 +211,9 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
     def _walk(self) -> None:
         """Step every row, the rows shared out to the threads."""
         rows = self.rows
-        if self.threads == 1:
-            rows.raise_for(rows.step_many(self._ended, 0, self.num_envs))
-            return
-        if self._pool is None or self._pool_process != os.getpid():  # threads do not survive a fork
-            self._pool = ThreadPoolExecutor(self.threads)
-            self._pool_process = os.getpid()
-        bounds = np.linspace(0, self.num_envs, self.threads + 1).astype(int)
-        skips = [self._ended] * self.threads
-        rows.raise_for(max(self._pool.map(rows.step_many, skips, bounds[:-1], bounds[1:])))
+        codes = share_out(
+            lambda first, last: rows.step_many(self._ended, first, last),
+            self.num_envs,
+            self.threads,
+        )
+        rows.raise_for(max(codes))
