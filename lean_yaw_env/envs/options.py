@@ -57,8 +57,8 @@ class EnvOptions:
     mass_offset_range : [0, 1]
         Mass offset that an action of 1 commands, in leg lengths.
     max_offset_change : [0, 2], optional
-        Largest change of the offset in a step. The tasks on a slope keep it gentle, 0.005, as the paper does: larger ones let a
-        policy power the walk by pumping.
+        Largest change of the offset in a step; the task's default otherwise. The tasks of steering down a slope keep it gentle, 0.005,
+        as the paper does: larger ones let a policy power the walk by pumping.
     horizon : (0, inf], optional
         Simulated time after which an episode is truncated.
     start_disturbance : [0, 5]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from lean_yaw_env.envs import columns as c
@@ -52,7 +54,7 @@ class Footage:
             headings=np.array(self._headings),
             feet=tuple(self._feet),
             path=np.array(self._path),
-            commanded_heading=command,
+            commanded_heading=self._goal_direction() if command is None else command,
             goals=self._goals(),
             reference_path=None if task.reference_path is None else task.reference_path(memory),
             lines=status_lines(
@@ -64,6 +66,13 @@ class Footage:
                 status="walking" if fall is None else f"fell {fall}",
             ),
         )
+
+    def _goal_direction(self) -> float | None:
+        """Where the goal in force is from here, which may be beyond the picture."""
+        if not self._goal_places:
+            return None
+        downhill, right = np.subtract(self._goal_places[-1], self._path[-1])
+        return math.atan2(-right, downhill)
 
     def _goals(self) -> list[Goal]:
         """The goals reached so far, and the one in force."""

@@ -71,7 +71,7 @@ class Task:
     summary: str
     reward: str
     history: tuple[str, ...]
-    ends: str = "nothing else"
+    ends: str = ""
     commands: dict[str, Command] = field(default_factory=dict)
     command_column: int | None = None
     goal_columns: tuple[int, int] | None = None

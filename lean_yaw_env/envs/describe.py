@@ -1,0 +1,222 @@
+"""The environments' tables for the documents, made from the code so that they cannot disagree with it.
+
+``python -m lean_yaw_env.envs.describe docs/environments.md`` renews the tables of that page: what stands between the marks
+``<!-- NAME -->`` and ``<!-- end -->``.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+import re
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from lean_yaw_env.envs import columns as c
+from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.envs.tasks import Task, task_named
+from lean_yaw_env.envs.transition import (
+    BODY_DEVIATIONS,
+    HELD_OUT_REACH,
+    OBSERVATION_LIMIT,
+    OFFSET_SCALE,
+    START_DEVIATIONS,
+    STATE_CENTRES,
+    STATE_SCALES,
+)
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, PARAMETER_NAMES, STATE_FIELDS
+from lean_yaw_env.registration import NAMESPACE, TASK_VERSIONS
+
+INFO_MEANINGS = {
+    "state": "section state (5,), not mirrored, after the push if there is one",
+    "footprint": "contact reference point of the stance foot (2,): downhill, right, from the start, in leg lengths",
+    "stance_side": "+1 while the left foot stands, -1 the right",
+    "mass_offset": "offset in force, leg lengths, positive to the right",
+    "inter_leg_angle": "commanded in the last step, rad",
+    "commanded_offset": "commanded in the last step",
+    "time": "since the start of the episode",
+    "steps": "since the start of the episode",
+    "distance": "sum of the steps' advances along the mean heading of their two footprints",
+    "duration": "of the last step",
+    "least_normal_force": "of the last step, in weights",
+    "greatest_friction": "of the last step, tangential over normal force",
+    "gravity_work": "of the last step, in weight times leg length",
+    "shift_work": "of the last step, put in by moving the masses",
+    "impact_loss": "of the last step",
+    "ankle_loss": "of the last step, into the ankle's spring and damper",
+    "speed": "advance of the last step over its duration",
+    "fall": "how the walker fell in the last step, or None",
+}
+OPTIONAL_INFO_MEANINGS = {
+    "commanded_heading": "rad; of tasks that command one",
+    "pitch_push": "the last push on the pitch rate; with pushes",
+    "ankle_push": "the last push on the ankle rate; with pushes",
+    **{
+        name: "of this episode's body; with random bodies"
+        for name in PARAMETER_NAMES[: c.BODY_COLUMNS]
+    },
+}
+
+
+def table(header: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """A table in Markdown."""
+    titles = list(header)
+    lines = [titles, ["---"] * len(titles), *([str(cell) for cell in row] for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def describe_observation() -> str:
+    """What every task observes."""
+    rows = [
+        (k, field.name, field.unit, f"{centre:g}", f"{scale:g}", field.description)
+        for k, (field, centre, scale) in enumerate(
+            zip(STATE_FIELDS, STATE_CENTRES, STATE_SCALES, strict=True)
+        )
+    ]
+    rows.append((5, "mass_offset", "leg lengths", "0", f"{OFFSET_SCALE:g}", "mass offset in force"))
+    rows.append((6, "stance_foot", "", "0", "1", "+1 left, -1 right; only with `mirror=False`"))
+    return table(("number", "name", "unit", "centre", "scale", "meaning"), rows)
+
+
+def describe_action() -> str:
+    """What an action means with the options' defaults."""
+    options = EnvOptions()
+    reach = f"{options.mass_offset_range:g}"
+    return table(
+        ("number", "sets", "range"),
+        (
+            (
+                0,
+                f"inter-leg angle, {INTER_LEG_ANGLE} + {options.inter_leg_angle_range} a0 rad",
+                f"{INTER_LEG_ANGLE - options.inter_leg_angle_range:g} to {INTER_LEG_ANGLE + options.inter_leg_angle_range:g} rad",
+            ),
+            (
+                1,
+                f"mass offset, {reach} a1 leg lengths, positive to the right of a left stance (and its mirror image of a right one), as far as "
+                "the largest change per step allows",
+                f"-{reach} to {reach}",
+            ),
+        ),
+    )
+
+
+def describe_start() -> str:
+    """How far a start is from the gait, and what bodies are drawn."""
+    start = table(
+        ("coordinate", "largest deviation"),
+        (
+            (field.name, f"{reach:g} {field.unit}")
+            for field, reach in zip(STATE_FIELDS, START_DEVIATIONS, strict=True)
+        ),
+    )
+    bodies = table(
+        ("parameter", "training", "held out, outside the training box"),
+        (
+            (name, f"within {reach:g}", f"within {HELD_OUT_REACH * reach:g}")
+            for name, reach in zip(PARAMETER_NAMES, BODY_DEVIATIONS, strict=False)
+        ),
+    )
+    return f"{start}\n\n{bodies}"
+
+
+def describe_options() -> str:
+    """Every constructor argument, from the options' own documentation."""
+    text = inspect.getdoc(EnvOptions) or ""
+    section = text.split("Parameters\n----------\n")[1].split("\n\nRaises\n")[0]
+    rows = []
+    for entry in re.split(r"\n(?=\S)", section):
+        head, *body = entry.split("\n")
+        name, kind = head.split(" : ")
+        default = getattr(EnvOptions(), name)
+        meaning = " ".join(line.strip() for line in body).replace("``", "`")
+        rows.append((f"`{name}`", f"`{default}`", kind, meaning))
+    return table(("option", "default", "values", "meaning"), rows)
+
+
+def describe_info() -> str:
+    """What every task's ``info`` tells."""
+    meanings = {**INFO_MEANINGS, **OPTIONAL_INFO_MEANINGS}
+    return table(("key", "meaning"), ((f"`{key}`", text) for key, text in meanings.items()))
+
+
+def describe_task(task: Task) -> str:
+    """One task: what is asked, observed, paid for and measured."""
+    body = task.parameters
+    slope = f"{body.slope:g} rad" + (", turning with the walker" if body.slope_turns else "")
+    facts = [
+        ("slope", slope),
+        ("horizon", f"{task.horizon:g} units of time (truncation)"),
+        ("ends", "; ".join(filter(None, ("a fall, a termination without reward", task.ends)))),
+        ("reward per unit of time", task.reward),
+        ("largest change of offset per step", f"{task.max_offset_change:g}"),
+        ("push level", f"{task.push_level:g}"),
+        ("start", f"pumping by {task.pumping:g}" if task.pumping else "the gait on the slope"),
+    ]
+    for name, command in task.commands.items():
+        bounds = f"each in [{command.low:.4g}, {command.high:.4g}]"
+        facts.append((f"reset option `{name}`", f"{command.meaning}; {bounds}"))
+    facts.append(("versions", "; ".join(task.history)))
+    parts = [task.summary, table(("", ""), facts)]
+    if task.features:
+        parts.append("Observed after the common numbers:")
+        parts.append(
+            table(
+                ("name", "unit", "centre", "scale", "meaning"),
+                (
+                    (f.name, f.unit, f"{f.centre:g}", f"{f.scale:g}", f.meaning)
+                    for f in task.features
+                ),
+            )
+        )
+    parts.append("Success, in `info`:")
+    parts.append(
+        table(("key", "meaning"), ((f"`{key}`", m.meaning) for key, m in task.metrics.items()))
+    )
+    return "\n\n".join(parts)
+
+
+def sections() -> dict[str, str]:
+    """Every generated part of the page, by the name in its mark."""
+    parts = {
+        "observation": f"Clipped to +-{OBSERVATION_LIMIT:g}.\n\n{describe_observation()}",
+        "action": describe_action(),
+        "start": describe_start(),
+        "options": describe_options(),
+        "info": describe_info(),
+    }
+    for name, version in TASK_VERSIONS.items():
+        title = f"### {NAMESPACE}/{name}-v{version}"
+        parts[name] = f"{title}\n\n{describe_task(task_named(name))}"
+    return parts
+
+
+def renewed(page: str) -> str:
+    """The page with its generated parts as the code has them.
+
+    Raises
+    ------
+    ValueError
+        If the page lacks the marks of a part, or has marks of none.
+    """
+    parts = sections()
+    pattern = re.compile(r"<!-- (\S+) -->\n.*?<!-- end -->", re.DOTALL)
+    marked = [match[1] for match in pattern.finditer(page)]
+    if sorted(marked) != sorted(parts):
+        raise ValueError(
+            f"the page must mark each of {', '.join(parts)} once; it marks {', '.join(marked)}"
+        )
+    return pattern.sub(lambda match: f"<!-- {match[1]} -->\n{parts[match[1]]}\n<!-- end -->", page)
+
+
+def main(path: str) -> None:
+    """Renew a page's generated parts in place."""
+    page = Path(path)
+    text = renewed(page.read_text(encoding="utf-8"))
+    beside = page.with_suffix(".tmp")
+    beside.write_text(text, encoding="utf-8")
+    os.replace(beside, page)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
