@@ -152,7 +152,7 @@ def test_gravity_s_work_is_how_far_the_masses_come_down(seed: int, gait: Vector)
     before = r.masses(*state[:3], case.previous, case.side).reshape(2, 3).mean(axis=0)
     after = r.masses(*end[:3], case.result.mass_offset, -case.side).reshape(2, 3).mean(axis=0)
     dx, dz = case.result.displacement
-    way = after + [dx, 0.0, dz] - before
+    way = after + np.array([dx, 0.0, dz]) - before
     # the masses stay where they are at heel strike, so the new stance's geometry must agree with the old one's
     assert case.result.energy.gravity_work == pytest.approx(r.gravity @ way, abs=1e-11)
 

@@ -133,8 +133,11 @@ def first_step_length(landing, shift_end):
 
 @inlined
 def shift_end_of(stance):
-    """When the masses stop, or zero if they do not move."""
-    return 1.0 / stance.shift_rate if stance.offset_change.real != 0.0 else 0.0
+    """When the masses stop, or zero if they do not move.
+
+    Masses that move only in a derivative's imaginary part count: the error control does not see them, the shift's end must be met.
+    """
+    return 1.0 / stance.shift_rate if stance.offset_change != 0.0 else 0.0
 
 
 @inlined

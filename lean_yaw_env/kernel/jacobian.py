@@ -43,10 +43,11 @@ def step_jacobian(
         jacobian[2, column] = outcome.ankle_angle.imag / _TINY
         jacobian[3, column] = outcome.stance_pitch_rate.imag / _TINY
         jacobian[4, column] = outcome.ankle_rate.imag / _TINY
-        state[0] = outcome.heading.real
-        state[1] = outcome.stance_pitch.real
-        state[2] = outcome.ankle_angle.real
-        state[3] = outcome.stance_pitch_rate.real
-        state[4] = outcome.ankle_rate.real
-        status = outcome.status
+        if column == 0:
+            state[0] = outcome.heading.real
+            state[1] = outcome.stance_pitch.real
+            state[2] = outcome.ankle_angle.real
+            state[3] = outcome.stance_pitch_rate.real
+            state[4] = outcome.ankle_rate.real
+            status = outcome.status
     return status

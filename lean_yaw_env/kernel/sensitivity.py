@@ -49,10 +49,11 @@ def step_sensitivity(body, command, state, side, after, jacobian):
         jacobian[2, column] = outcome.ankle_angle.imag / _TINY
         jacobian[3, column] = outcome.stance_pitch_rate.imag / _TINY
         jacobian[4, column] = outcome.ankle_rate.imag / _TINY
-        after[0] = outcome.heading.real
-        after[1] = outcome.stance_pitch.real
-        after[2] = outcome.ankle_angle.real
-        after[3] = outcome.stance_pitch_rate.real
-        after[4] = outcome.ankle_rate.real
-        status = outcome.status
+        if column == 0:
+            after[0] = outcome.heading.real
+            after[1] = outcome.stance_pitch.real
+            after[2] = outcome.ankle_angle.real
+            after[3] = outcome.stance_pitch_rate.real
+            after[4] = outcome.ankle_rate.real
+            status = outcome.status
     return status
