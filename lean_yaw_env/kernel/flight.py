@@ -100,9 +100,11 @@ def predict_landing(h, gap0, rate0, acceleration0, gap1, rate1, acceleration1):
 
     ahead = time_to_touch(gap1, rate1, acceleration1)
     guess = 1.0 + ahead / h
-    inside = gap0 / (gap0 - gap1 if gap1 <= 0.0 else 1.0)
-    inside = inside if gap1 <= 0.0 else 0.0
-    s = inside if passed else guess
+    # Within the step: where a straight line through its ends, or a parabola down to the least gap, comes down through zero
+    dips = turns & (least <= 0.0)
+    straight = gap0 / (gap0 - gap1 if gap1 <= 0.0 else 1.0)
+    dipping = lowest * (1.0 - np.sqrt((-least if dips else 0.0) / (gap0 - least if dips else 1.0)))
+    s = (dipping if dips else straight) if passed else guess
     value = gap0
     for _ in range(4):
         value = gap0 + s * (a1 + s * (a2 + s * (a3 + s * (a4 + s * a5))))
