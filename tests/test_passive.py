@@ -60,7 +60,10 @@ def test_swing_foot_accelerates_along_its_path_by_gravity_alone(stance, side) ->
     motion = WIDE.motion(state, duration=step.duration, samples=201, stance=stance)
     angles = [motion[name] for name in ("stance_pitch", "ankle_angle", "inter_leg_angle")]
     model = reference(WIDE)
-    places = [legs(model, state[0], *q, side) for q in zip(*angles, strict=True)]
+    places = [
+        legs(model, state[0], pitch, ankle, inter_leg, side)
+        for pitch, ankle, inter_leg in zip(*angles, strict=True)
+    ]
     path = make_interp_spline(motion["time"], np.array([end for _, end, _ in places]), k=9)
     free = path.derivative(2)(motion["time"]) - model.gravity
     along = np.array([tangent @ a for (_, _, tangent), a in zip(places, free, strict=True)])

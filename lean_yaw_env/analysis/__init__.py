@@ -1,9 +1,11 @@
 """Gaits and their stability: stride map, limit cycles, modes, branches, maps, basins, demands."""
 
-from lean_yaw_env.analysis.basin import Disturbance, basin, largest_disturbance
+from lean_yaw_env.analysis.attraction import Disturbance, basin, largest_disturbance
+from lean_yaw_env.analysis.contact import FloorDemand, StepDemand, floor_demand
 from lean_yaw_env.analysis.continuation import Branch, Event, continue_gait
 from lean_yaw_env.analysis.critical_speed import stable_speeds
-from lean_yaw_env.analysis.floor_demand import FloorDemand, StepDemand, floor_demand
+from lean_yaw_env.analysis.eigenmodes import Mode, modes
+from lean_yaw_env.analysis.gait_map import load_map, save_map, stability_map
 from lean_yaw_env.analysis.limit_cycle import (
     LimitCycle,
     find_gait,
@@ -11,7 +13,6 @@ from lean_yaw_env.analysis.limit_cycle import (
     find_passive_gaits,
     planar_gait_rate,
 )
-from lean_yaw_env.analysis.modes import Mode, modes
 from lean_yaw_env.analysis.periodic import find_periodic_gait
 from lean_yaw_env.analysis.section_map import (
     BODY_PARAMETERS,
@@ -20,7 +21,6 @@ from lean_yaw_env.analysis.section_map import (
     PassiveMap,
     section_map_of,
 )
-from lean_yaw_env.analysis.stability_map import load_map, save_map, stability_map
 from lean_yaw_env.analysis.storage import load_dataset, save_dataset
 from lean_yaw_env.analysis.stride import StrideJacobian, stride_jacobian, stride_map
 
