@@ -75,7 +75,7 @@ def test_a_slow_walker_with_its_weight_outside_its_foot_falls_sideways_over_it()
 
 
 def test_a_leaning_walker_s_swing_foot_is_in_the_floor_and_trips(gait: Vector) -> None:
-    state = gait + [0.0, 0.0, 0.9, 0.0, 0.0]
+    state = gait + np.array([0.0, 0.0, 0.9, 0.0, 0.0])
     result = Walker().step(state)
     assert (result.fall, result.duration) == (Fall.TRIP, 0.0)
     assert _gap(Walker().parameters, state, 0.3) < 0.0
@@ -83,7 +83,7 @@ def test_a_leaning_walker_s_swing_foot_is_in_the_floor_and_trips(gait: Vector) -
 
 
 def test_the_strike_option_lands_a_buried_foot_at_once(gait: Vector) -> None:
-    state = gait + [0.0, 0.0, 0.3, 0.0, -0.8]
+    state = gait + np.array([0.0, 0.0, 0.3, 0.0, -0.8])
     assert Walker().step(state).fall is Fall.TRIP
     result = Walker(WalkerParameters(early_contact="strike")).step(state)
     assert (result.fall, result.duration) == (None, 0.0)
@@ -212,9 +212,8 @@ def test_no_walker_called_fallen_backward_would_have_stepped_on(gait: Vector) ->
         motion = Walker(bodies[i]).stance_motion(
             states[i], duration=4.0, samples=120, inter_leg_angle=angles[i], mass_offset=offsets[i]
         )
-        for pitch, ankle, rate, force in zip(
-            *(motion[k] for k in ("stance_pitch", "ankle_angle", "stance_pitch_rate", "normal_force"))
-        ):  # fmt: skip
+        names = ("stance_pitch", "ankle_angle", "stance_pitch_rate", "normal_force")
+        for pitch, ankle, rate, force in np.column_stack([motion[name] for name in names]):
             if force <= 0.0 or max(abs(pitch), abs(ankle)) > 1.2:
                 break
             state = np.array([states[i, 0], pitch, ankle])

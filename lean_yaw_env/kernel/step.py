@@ -93,7 +93,7 @@ def start(stance, body, pitch, twist, pitch_rate, twist_rate):
         stance, sin_a, cos_a, sin_twist, cos_twist, pitch_rate, twist_rate, dw, dv
     )
     z, q, dq = middle_of_masses(stance, sin_twist, cos_twist, stance.offset_before)
-    u, w, m11, m12, m22 = mass_matrix(stance, sin_a, cos_a, sin_twist, z, q, dq)
+    _, _, m11, m12, m22 = mass_matrix(stance, sin_a, cos_a, sin_twist, z, q, dq)
 
     first = first_step_length(
         time_to_touch(gap.real, gap_rate.real, gap_acceleration.real), shift_end_of(stance).real
