@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from typing import NamedTuple
@@ -165,7 +165,7 @@ class Walk:
 class Walker:
     """The active three-dimensional walker of the paper (Figure 6 C and E): exact steps from heel strike to heel strike."""
 
-    parameters: WalkerParameters = WalkerParameters()
+    parameters: WalkerParameters = field(default_factory=WalkerParameters)
 
     def __post_init__(self) -> None:
         if not isinstance(self.parameters, WalkerParameters):

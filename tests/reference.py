@@ -7,6 +7,7 @@ complex step, the equations of motion from D'Alembert's principle on the masses,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -128,8 +129,10 @@ class ReferenceWalker:
         gap.terminal, gap.direction = True, -1
         pieces = [0.0, self.shift_time, 10.0] if before != after else [0.0, 10.0]
         y = np.array(state[1:])
-        for begin, end in zip(pieces, pieces[1:]):
-            s = solve_ivp(rhs, (begin, end), y, "DOP853", events=gap, rtol=tolerance, atol=tolerance)
+        for begin, end in pairwise(pieces):
+            s = solve_ivp(
+                rhs, (begin, end), y, "DOP853", events=gap, rtol=tolerance, atol=tolerance
+            )
             y = s.y[:, -1]
             if s.status == 1:
                 break
@@ -148,7 +151,9 @@ class ReferenceWalker:
         offset, offset_rate, _ = self.shift(time, before, after)
         old = self.jacobian(heading, np.array([y[0], y[1], offset]), side)
         velocity = old @ np.array([y[2], y[3], offset_rate])
-        velocity = np.concatenate([velocity[3:], velocity[:3]])  # the other hip is the new stance hip
+        velocity = np.concatenate(
+            [velocity[3:], velocity[:3]]
+        )  # the other hip is the new stance hip
         centre, foot, ankle = self.swing_foot(heading, y[0], y[1], inter_leg, side)
         # foot = Ry(heading') Rz(pitch')
         new_heading = np.arctan2(foot[0, 2], foot[2, 2])

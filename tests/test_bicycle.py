@@ -148,9 +148,7 @@ def test_motion_agrees_with_an_integration_of_eq_4(speed):
         return np.concatenate([state[2:], np.linalg.solve(bicycle.mass_matrix, force)])
 
     times, start = np.linspace(0.0, 2.0, 21), [0.01, -0.02, 0.1, 0.05]
-    reference = solve_ivp(
-        derivative, (0.0, 2.0), start, "DOP853", times, rtol=1e-12, atol=1e-14
-    ).y
+    reference = solve_ivp(derivative, (0.0, 2.0), start, "DOP853", times, rtol=1e-12, atol=1e-14).y
     motion = bicycle.motion(speed, times, lean=0.01, steer=-0.02, lean_rate=0.1, steer_rate=0.05)
     found = np.array([motion.lean, motion.steer, motion.lean_rate, motion.steer_rate])
     # The reference's tolerance over some hundred steps, relative to the largest motion.

@@ -243,7 +243,7 @@ def test_a_mirrored_walker_walks_a_mirrored_step(
 
 def test_on_the_level_every_direction_is_the_same() -> None:
     level = walker(slope=0.0)
-    turned = np.array(UNEVEN) + [1.3, 0.0, 0.0, 0.0, 0.0]
+    turned = np.add(UNEVEN, (1.3, 0.0, 0.0, 0.0, 0.0))
     here, there = level.step(UNEVEN), level.step(turned)
     # Round-off and the integrator's error, which differs as the coordinates do.
     np.testing.assert_allclose(
@@ -544,7 +544,7 @@ def test_a_fall_is_named_and_leaves_the_stance_foot(
 
 
 def test_no_gait_near_the_guess_is_a_named_error() -> None:
-    with pytest.raises(NoGaitError, match="Newton's method from .* fell: "):
+    with pytest.raises(NoGaitError, match=r"Newton's method from .* fell: "):
         find_passive_gait(walker(hip_width=0.0), np.array([0.0, 0.15, 0.0, -0.02, 0.0, 0.0, -0.3]))
 
 

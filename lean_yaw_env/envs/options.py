@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
 from lean_yaw_env.analysis import find_gait
 from lean_yaw_env.envs import columns as c
@@ -161,6 +162,10 @@ class EnvOptions:
         row[c.HORIZON] = horizon
         row[c.MIRRORED] = 1.0 if self.mirror else 0.0
         row[c.DISTURBANCE] = self.start_disturbance
+        row[c.BODY_DRAW] = _BODY_DRAWS[self.random_body]
+        if self.random_body is not None:
+            row[c.BODY_CENTRE : c.BODY_REACH] = _require_body_box(parameters)
+            row[c.BODY_REACH : c.TASK_CONSTANTS] = BODY_DEVIATIONS
         row[c.GAIT : c.GAIT_OFFSET] = gait_of(parameters, task.pumping)
         row[c.GAIT_OFFSET] = 0.0 - task.pumping
         row[c.DELAYED] = self.action_delay
@@ -169,10 +174,6 @@ class EnvOptions:
         row[c.HIDES_HEADING] = parameters.slope_turns
         row[c.PITCH_PUSH_SIZE] = push * PITCH_PUSH
         row[c.ANKLE_PUSH_SIZE] = push * ANKLE_PUSH
-        row[c.BODY_DRAW] = _BODY_DRAWS[self.random_body]
-        if self.random_body is not None:
-            row[c.BODY_CENTRE : c.BODY_REACH] = _require_body_box(parameters)
-            row[c.BODY_REACH : c.TASK_CONSTANTS] = BODY_DEVIATIONS
         row[c.TASK_CONSTANTS : c.TASK_CONSTANTS + len(task.constants)] = task.constants
         return row
 
@@ -182,17 +183,19 @@ class EnvOptions:
         features = (feature.name for feature in task.features)
         return (*(field.name for field in STATE_FIELDS), "mass_offset", *foot, *features)
 
-    def observation_space(self, task: Task) -> spaces.Box:
+    def observation_space(self, task: Task) -> spaces.Space[NDArray[np.float32]]:
         size = len(self.observation_names(task))
-        return spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (size,), np.float32)
+        box: Any = spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (size,), np.float32)
+        return box
 
 
 ACTION_SIZE = 2
 
 
-def action_space() -> spaces.Box:
+def action_space() -> spaces.Space[NDArray[np.float32]]:
     """Inter-leg angle and mass offset, each from -1 to 1; zero is the paper's fixed controller."""
-    return spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
+    box: Any = spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
+    return box
 
 
 @lru_cache(maxsize=256)

@@ -22,7 +22,10 @@ from numba.extending import intrinsic, overload
 # A division by zero gives inf or nan as in C: Python's exception would be a branch, and a branch stops vectorisation.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 
-inlined = njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
+# Numba's type hints know neither its extension options nor what a dispatcher keeps
+_njit: Any = njit
+
+inlined = _njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
 
 
 def borrowed(array: Any) -> Any:
@@ -42,7 +45,8 @@ def _without_owner(typing_context, array):
         view.parent = cgutils.get_null_value(view.parent.type)
         return view._getvalue()
 
-    return array(array), generate
+    unowned: Any = array  # a Numba type, called to make a signature
+    return unowned(array), generate
 
 
 @overload(borrowed)
@@ -73,7 +77,7 @@ def entry_point(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
-        dispatcher = njit(nogil=True, **_OPTIONS, **options)(function)
+        dispatcher = _njit(nogil=True, **_OPTIONS, **options)(function)
         if not hasattr(dispatcher, "enable_caching"):  # NUMBA_DISABLE_JIT=1 leaves a plain function
             return dispatcher
         try:

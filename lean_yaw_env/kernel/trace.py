@@ -75,7 +75,7 @@ def trace(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side, du
         sin_b, cos_b = sine_cosine(b)
         offset, offset_rate, _ = mass_offset(c, t)
         z, q, dq = middle_of_masses(c, sin_b, cos_b, offset)
-        u, lever, m11, m12, m22 = mass_matrix(c, sin_a, cos_a, sin_b, z, q, dq)
+        u, _, m11, m12, m22 = mass_matrix(c, sin_a, cos_a, sin_b, z, q, dq)
         px, py, pz = middle_position(c, x, sin_a, cos_a, q, dq)
         along = sin_b * (-u * w + dq * v) - cos_b * q * v
         energy = kinetic_energy(m11, m12, m22, w, v) + offset_rate * (along + 0.5 * offset_rate)

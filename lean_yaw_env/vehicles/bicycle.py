@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -220,7 +221,7 @@ class LinearBicycle:
         pair_speeds = [speed for speed, _ in polynomial.imaginary_pairs()]
         borders = [0.0, *sorted({*polynomial.zero_eigenvalue_speeds(), *pair_speeds}), math.inf]
         lower = None
-        for low, high in zip(borders[:-1], borders[1:], strict=True):
+        for low, high in pairwise(borders):
             beyond = 2.0 * max(low, polynomial.speed_scale)
             stable = self._has_no_growth(0.5 * (low + high) if math.isfinite(high) else beyond)
             if stable and lower is None:

@@ -88,9 +88,7 @@ class FrameBody:
         require_within("frame mass", self.mass, 0.0, low_included=True)
         for name in ("x", "z", "inertia_xx", "inertia_xz", "inertia_yy", "inertia_zz"):
             require_finite(f"frame {name}", getattr(self, name))
-        plane = np.array(
-            [[self.inertia_xx, self.inertia_xz], [self.inertia_xz, self.inertia_zz]]
-        )
+        plane = np.array([[self.inertia_xx, self.inertia_xz], [self.inertia_xz, self.inertia_zz]])
         principal = np.sort([*np.linalg.eigvalsh(plane), self.inertia_yy])
         slack = _INERTIA_SLACK * abs(principal[2])
         if principal[0] < -slack or principal[2] > principal[0] + principal[1] + slack:
@@ -193,12 +191,26 @@ def _whole_bicycle(p: BicycleParameters) -> _Assembly:
         mass=mass,
         x=(b.x * b.mass + h.x * h.mass + w * f.mass) / mass,
         z=moment_z / mass,
-        xx=r.inertia_xx + b.inertia_xx + h.inertia_xx + f.inertia_xx
-        + r.mass * r.radius**2 + b.mass * b.z**2 + h.mass * h.z**2 + f.mass * f.radius**2,
-        xz=b.inertia_xz + h.inertia_xz
-        - b.mass * b.x * b.z - h.mass * h.x * h.z + f.mass * w * f.radius,
-        zz=r.inertia_xx + b.inertia_zz + h.inertia_zz + f.inertia_xx
-        + b.mass * b.x**2 + h.mass * h.x**2 + f.mass * w**2,
+        xx=r.inertia_xx
+        + b.inertia_xx
+        + h.inertia_xx
+        + f.inertia_xx
+        + r.mass * r.radius**2
+        + b.mass * b.z**2
+        + h.mass * h.z**2
+        + f.mass * f.radius**2,
+        xz=b.inertia_xz
+        + h.inertia_xz
+        - b.mass * b.x * b.z
+        - h.mass * h.x * h.z
+        + f.mass * w * f.radius,
+        zz=r.inertia_xx
+        + b.inertia_zz
+        + h.inertia_zz
+        + f.inertia_xx
+        + b.mass * b.x**2
+        + h.mass * h.x**2
+        + f.mass * w**2,
     )
 
 
@@ -256,13 +268,17 @@ def canonical_matrices(parameters: BicycleParameters) -> CanonicalMatrices:
     rate = cosine / w  # yaw rate of the rear frame per unit of speed and steer
     return CanonicalMatrices(
         mass=np.array([[whole.xx, m_12], [m_12, i_ll + 2 * mu * i_lz + mu**2 * whole.zz]]),
-        damping=np.array([
-            [0.0, gyroscopic + whole.xz * rate - mu * whole.mass * whole.z],
-            [-gyroscopic, i_lz * rate + mu * (s_a + whole.zz * rate)],
-        ]),
+        damping=np.array(
+            [
+                [0.0, gyroscopic + whole.xz * rate - mu * whole.mass * whole.z],
+                [-gyroscopic, i_lz * rate + mu * (s_a + whole.zz * rate)],
+            ]
+        ),
         gravity_stiffness=np.array([[whole.mass * whole.z, -s_a], [-s_a, -s_a * sine]]),
-        speed_stiffness=np.array([
-            [0.0, (spin - whole.mass * whole.z) * rate],
-            [0.0, (s_a + front_spin * sine) * rate],
-        ]),
+        speed_stiffness=np.array(
+            [
+                [0.0, (spin - whole.mass * whole.z) * rate],
+                [0.0, (s_a + front_spin * sine) * rate],
+            ]
+        ),
     )

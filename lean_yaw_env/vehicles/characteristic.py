@@ -66,13 +66,13 @@ class CharacteristicPolynomial:
         mixed = _mixed_determinant
         return cls(
             coefficients=(
-                Polynomial([
-                    _determinant(static), 0.0, mixed(static, dynamic), 0.0, _determinant(dynamic)
-                ]),
+                Polynomial(
+                    [_determinant(static), 0.0, mixed(static, dynamic), 0.0, _determinant(dynamic)]
+                ),
                 Polynomial([0.0, mixed(damping, static), 0.0, mixed(damping, dynamic)]),
-                Polynomial([
-                    mixed(mass, static), 0.0, mixed(mass, dynamic) + _determinant(damping)
-                ]),
+                Polynomial(
+                    [mixed(mass, static), 0.0, mixed(mass, dynamic) + _determinant(damping)]
+                ),
                 Polynomial([0.0, mixed(mass, damping)]),
                 Polynomial([_determinant(mass)]),
             ),

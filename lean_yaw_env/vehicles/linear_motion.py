@@ -55,8 +55,9 @@ def finite_vector(name: str, values: ArrayLike) -> FloatArray:
     """
     vector = np.array(values, dtype=np.float64, ndmin=1)
     if vector.ndim != 1 or vector.size == 0:
-        raise ValueError(f"{name} must be a number or a non-empty sequence, got shape "
-                         f"{np.shape(values)}")
+        raise ValueError(
+            f"{name} must be a number or a non-empty sequence, got shape {np.shape(values)}"
+        )
     if not np.all(np.isfinite(vector)):
         raise ValueError(f"{name} must be finite, got {vector[~np.isfinite(vector)][0]!r}")
     return vector

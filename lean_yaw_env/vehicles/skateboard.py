@@ -211,17 +211,24 @@ class Skateboard:
             If an unstable motion outgrows floating point.
         """
         equation = self.equation_of_motion(speed)
-        start = np.array([
-            require_finite("lean", lean), require_finite("lean_rate", lean_rate), 0.0, 0.0
-        ])
+        start = np.array(
+            [require_finite("lean", lean), require_finite("lean_rate", lean_rate), 0.0, 0.0]
+        )
         samples = finite_vector("times", times)
         # Rows: lean, lean rate, heading (yaw rate = v / r_c), lateral position (v * heading).
-        matrix = np.array([
-            [0.0, 1.0, 0.0, 0.0],
-            [-equation.stiffness / equation.inertia, -equation.damping / equation.inertia, 0, 0],
-            [speed * self.curvature_per_lean(), 0.0, 0.0, 0.0],
-            [0.0, 0.0, speed, 0.0],
-        ])
+        matrix = np.array(
+            [
+                [0.0, 1.0, 0.0, 0.0],
+                [
+                    -equation.stiffness / equation.inertia,
+                    -equation.damping / equation.inertia,
+                    0,
+                    0,
+                ],
+                [speed * self.curvature_per_lean(), 0.0, 0.0, 0.0],
+                [0.0, 0.0, speed, 0.0],
+            ]
+        )
         return SkateboardMotion(samples, *linear_motion(matrix, start, samples).T)
 
 
