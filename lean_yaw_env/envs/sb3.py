@@ -11,9 +11,13 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
+from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 
 _TRUNCATED = "TimeLimit.truncated"
+_ROW_ARRAYS = ("bodies", "memory", "stream", "actions", "outcomes", "observations")
+_WORDS = 6  # of 64 bits, that a PCG64 generator's state takes
+_WORD = 2**64
 
 
 class WalkerVecEnv(VecEnv):
@@ -133,6 +137,46 @@ class WalkerVecEnv(VecEnv):
         """Many walkers draw no pictures."""
         return [None for _ in range(self.num_envs)]
 
+    def step_durations(self) -> NDArray[np.float64]:
+        """How long each walker's last step took in simulated time, shape (num_envs,); 0 where it ended an episode."""
+        return self.walkers.rows.outcomes[:, c.OUTCOME_DURATION].copy()
+
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """Copies of all that the walkers' next steps depend on, as arrays; only after ``reset``."""
+        if self.walkers._generators is None:
+            raise RuntimeError("call reset() before snapshot()")
+        generators = [_generator_words(g) for g in self.walkers._generators]
+        return {name: array.copy() for name, array in self._arrays().items()} | {
+            "generators": np.array(generators, dtype=np.uint64)
+        }
+
+    def restore(self, snapshot: dict[str, NDArray[Any]]) -> None:
+        """Bring the walkers to a snapshot's state.
+
+        Raises
+        ------
+        ValueError
+            If it is a snapshot of other walkers; nothing has changed then.
+        """
+        own = self._arrays()
+        shapes = {name: array.shape for name, array in own.items()}
+        shapes["generators"] = (self.num_envs, _WORDS)
+        found = {name: array.shape for name, array in snapshot.items()}
+        if found != shapes:
+            raise ValueError(f"snapshot must hold arrays of shapes {shapes}, not {found}")
+        for name, array in own.items():
+            array[:] = snapshot[name]
+        self.walkers._generators = [_generator_of(words) for words in snapshot["generators"]]
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        rows = self.walkers.rows
+        return {
+            **{name: getattr(rows, name) for name in _ROW_ARRAYS},
+            "ended": self.walkers._ended,
+            "episode_returns": self.episode_returns,
+            "episode_lengths": self.episode_lengths,
+        }
+
     def _reset_each(self, seeds: list[int | None] | None) -> NDArray[np.float32]:
         """Reset walkers that have options of their own, one after the other."""
         for i, options in enumerate(self._options):
@@ -171,3 +215,23 @@ def _of_walker(info: dict[str, Any], i: int) -> dict[str, Any]:
         for key, value in info.items()
         if not key.startswith(("_", "final_"))
     }
+
+
+def _generator_words(generator: np.random.Generator) -> list[int]:
+    """The state of a PCG64 generator, as Gymnasium seeds them, in words of 64 bits."""
+    state = generator.bit_generator.state
+    words = [part for key in ("state", "inc") for part in divmod(state["state"][key], _WORD)]
+    return [*words, state["has_uint32"], state["uinteger"]]
+
+
+def _generator_of(words: NDArray[np.uint64]) -> np.random.Generator:
+    """The generator that ``_generator_words`` tells the state of."""
+    high, low, high_increment, low_increment, has_uint32, uinteger = (int(word) for word in words)
+    bits = np.random.PCG64()
+    bits.state = {
+        "bit_generator": "PCG64",
+        "state": {"state": high * _WORD + low, "inc": high_increment * _WORD + low_increment},
+        "has_uint32": has_uint32,
+        "uinteger": uinteger,
+    }
+    return np.random.Generator(bits)

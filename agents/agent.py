@@ -1,0 +1,40 @@
+"""What an agent is: anything with Stable-Baselines3's ``predict``."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+State = tuple[NDArray[Any], ...] | None
+"""What an agent remembers from one call to the next; None for those that remember nothing."""
+
+
+class Agent(Protocol):
+    """Chooses actions from observations, for one walker or any batch of them."""
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: State = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.float32], State]:
+        """Choose actions.
+
+        Parameters
+        ----------
+        observation : shape (..., features)
+            As the environment gives it.
+        state : what the last call returned; None at first
+        episode_start : shape (...), optional
+            Where a new episode begins, so that what is remembered of the last one is dropped.
+        deterministic : bool
+            Take the best action rather than draw one.
+
+        Returns
+        -------
+        actions, shape (..., 2), in [-1, 1], and the new state
+        """
+        ...

@@ -1,0 +1,122 @@
+"""Steering by feedback: a proportional-derivative law on the mass offset around the offset that holds the heading."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from agents.agent import State
+from agents.observations import ObservationLayout
+from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, gait_of
+from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.parameters import STATE_FIELDS
+
+_ERROR = "heading_error"
+_ANKLE = [field.name for field in STATE_FIELDS].index("ankle_angle")
+_ANKLE_RATE = [field.name for field in STATE_FIELDS].index("ankle_rate")
+
+
+@dataclass(frozen=True)
+class HeadingGains:
+    """Gains of ``HeadingFeedback``; the defaults are what ``python -m agents.tune_feedback`` found.
+
+    Attributes
+    ----------
+    proportional : mass offset per rad of heading error
+    ankle, ankle_rate : mass offset per rad, and per rad / time unit, of the ankle's deviation from the gait
+        The derivative: a walker turns as far as it leans, so its lean is the rate of its heading, observed without a delay.
+    feedforward : share of the offset that holds the commanded heading
+    inter_leg_angle : change of the inter-leg angle from 0.3, rad, held all the time
+        Longer steps are slower in time but lean, and so turn, faster.
+    """
+
+    proportional: float = 0.051
+    ankle: float = -0.056
+    ankle_rate: float = 0.0104
+    feedforward: float = 0.947
+    inter_leg_angle: float = 0.106
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not math.isfinite(value):
+                raise ValueError(f"{name} must be a finite number, not {value!r}")
+
+
+class HeadingFeedback:
+    """Steers to the commanded heading by moving the masses.
+
+    The feedforward is the offset that holds a heading phi for good, sin(phi) = -mu / tan(slope); feedback is on the heading error
+    and, as its derivative, on the lean of the ankle.
+
+    Parameters
+    ----------
+    task : str
+        A task that shows a heading error.
+    options : EnvOptions
+        Those of the environment.
+    gains : HeadingGains
+
+    Raises
+    ------
+    ValueError
+        If the task shows no heading error.
+    NoGaitError
+        If the walker has no gait to take the ankle's deviation from.
+    """
+
+    def __init__(
+        self,
+        task: str = "Heading",
+        options: EnvOptions | None = None,
+        gains: HeadingGains | None = None,
+    ) -> None:
+        self._options = EnvOptions() if options is None else options
+        self._layout = ObservationLayout.of(task, self._options)
+        if _ERROR not in self._layout.names:
+            raise ValueError(
+                f"task must show {_ERROR} for feedback on it, but {task!r} shows {', '.join(self._layout.names)}"
+            )
+        self._gains = HeadingGains() if gains is None else gains
+        parameters = self._options.walker_parameters(task_named(task))
+        gait = gait_of(parameters)
+        self._gait_ankle, self._gait_ankle_rate = gait[_ANKLE], gait[_ANKLE_RATE]
+        self._tangent = math.tan(parameters.slope)
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: State = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.float32], State]:
+        """Actions of the law; see ``Agent.predict``. It remembers nothing and draws nothing."""
+        seen = self._layout.require(observation)
+        action = np.empty((*seen.shape[:-1], ACTION_SIZE), dtype=np.float32)
+        action[..., 0] = _share(self._gains.inter_leg_angle, self._options.inter_leg_angle_range)
+        action[..., 1] = _share(self._offset(seen), self._options.mass_offset_range)
+        return np.clip(action, -1.0, 1.0), None
+
+    def _offset(self, seen: NDArray[np.float32]) -> NDArray[np.float64]:
+        """The mass offset to command, in the frame of the observation: mirrored where that is."""
+        layout, gains = self._layout, self._gains
+        error = layout.quantity(seen, _ERROR)
+        commanded = layout.quantity(seen, "heading") + error
+        # in a mirrored observation the walker always stands on its left foot
+        side = 1.0 if self._options.mirror else layout.quantity(seen, "stance_foot")
+        ankle = layout.quantity(seen, "ankle_angle") - side * self._gait_ankle
+        ankle_rate = layout.quantity(seen, "ankle_rate") - side * self._gait_ankle_rate
+        holding = -self._tangent * np.sin(commanded)
+        return (
+            gains.feedforward * holding
+            - gains.proportional * error
+            + gains.ankle * ankle
+            + gains.ankle_rate * ankle_rate
+        )
+
+
+def _share(value: float | NDArray[np.float64], reach: float) -> float | NDArray[np.float64]:
+    """The action that means a value; none where actions mean nothing."""
+    return value / reach if reach > 0.0 else 0.0 * value

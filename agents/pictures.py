@@ -1,0 +1,111 @@
+"""Pictures of a training: its learning curve, and footprints of agents on one episode."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from agents.agent import Agent
+from agents.episodes import record_episode
+from agents.evaluation import Row
+from agents.ppo import TrainingLog
+from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.parameters import Vector
+from lean_yaw_env.rendering.files import written_whole
+from lean_yaw_env.rendering.palette import COMMAND, unit_colour
+from lean_yaw_env.rendering.picture import draw_footprints, new_figure
+
+WINDOW = 128
+"""Episodes that the curve's mean is of."""
+PICTURED_STEPS = 120
+"""Steps of an episode that are drawn: two or three commands, at a scale at which footprints can be told apart."""
+_DPI = 150
+_ARROW = 4.0  # leg lengths, of a commanded heading
+_STYLES = {"random": ":", "fixed": "-.", "feedback": "--", "ppo": "-"}
+
+
+def save_learning_curve(
+    log: TrainingLog, rows: list[Row], title: str, trained_steps: int, path: Path
+) -> None:
+    """Draw every episode's return against the steps trained, their running mean, and the evaluated agents' means as levels."""
+    figure = new_figure(7.0, 4.2)
+    axes = figure.subplots()
+    fell = ~log.survived
+    axes.plot(
+        log.steps[~fell],
+        log.returns[~fell],
+        ".",
+        color="0.75",
+        markersize=3,
+        label="an episode, survived",
+    )
+    if fell.any():
+        axes.plot(log.steps[fell], log.returns[fell], "x", color="tab:red", markersize=4, alpha=0.5, label="an episode, fell")  # fmt: skip
+    if len(log.returns) >= WINDOW:
+        mean = np.convolve(log.returns, np.full(WINDOW, 1.0 / WINDOW), "valid")
+        axes.plot(
+            log.steps[WINDOW - 1 :], mean, color="tab:blue", label=f"mean of {WINDOW}, exploring"
+        )
+    for row in rows:
+        if row.metric == "return":
+            style = _STYLES.get(row.agent, "-")
+            axes.axhline(row.mean, color="black", linewidth=1.0, linestyle=style, label=f"{row.agent}, evaluated: {row.mean:.1f}")  # fmt: skip
+    axes.set_xlabel("environment steps (walking steps)")
+    axes.set_ylabel("return of an episode")
+    axes.set_title(title)
+    axes.set_xlim(0, trained_steps)
+    axes.set_ylim(bottom=0)
+    axes.grid(color="0.9")
+    axes.set_axisbelow(True)
+    figure.legend(loc="outside right center", fontsize="small", frameon=False)
+    with written_whole(path) as temporary:
+        figure.savefig(temporary, dpi=_DPI)
+
+
+def save_agents_footprints(
+    agents: Mapping[str, Agent],
+    task: str,
+    path: Path,
+    *,
+    seed: int,
+    options: EnvOptions | None = None,
+) -> None:
+    """Draw the first steps of one episode, of an environment's seed, for each agent; arrows show the commanded headings where they
+    were given.
+    """
+    episodes = {
+        name: record_episode(agent, task, seed=seed, options=options, most_steps=PICTURED_STEPS)
+        for name, agent in agents.items()
+    }
+    parameters = (EnvOptions() if options is None else options).walker_parameters(task_named(task))
+    titled = {
+        name if episode.fall is None else f"{name} (fell)": episode
+        for name, episode in episodes.items()
+    }
+    figure = new_figure(2.4 * len(titled) + 0.8, 8.0)
+    axes = figure.subplots(1, len(titled), sharex=True, sharey=True, squeeze=False)[0]
+    draw_footprints(titled, list(axes), foot_radius=parameters.foot_radius)
+    for place, episode in zip(axes, titled.values(), strict=True):
+        place.xaxis.set_major_locator(MaxNLocator(5, integer=True))
+        for step, heading in episode.commands:
+            _draw_command(place, episode.footprints[step], heading)
+    axes[0].set_ylabel("downhill (leg lengths)")
+    with written_whole(path) as temporary:
+        figure.savefig(temporary, dpi=_DPI)
+
+
+def _draw_command(axes: Axes, footprint: Vector, heading: float) -> None:
+    """An arrow from a footprint towards a heading; a positive one is to the left."""
+    downhill, right = footprint
+    tip = (right - _ARROW * np.sin(heading), downhill + _ARROW * np.cos(heading))
+    axes.annotate(
+        "",
+        xy=tip,
+        xytext=(right, downhill),
+        arrowprops={"arrowstyle": "-|>", "color": unit_colour(COMMAND), "linewidth": 1.5},
+    )

@@ -1,0 +1,158 @@
+"""A trained policy for inference: a small network in numpy, with all it takes to know what it was trained for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from agents.agent import State
+from agents.observations import ObservationLayout
+from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
+
+Weights = Mapping[str, NDArray[np.float32]]
+
+ACTIVATIONS: dict[str, Callable[[NDArray[np.float32]], NDArray[np.float32]]] = {
+    "tanh": np.tanh,
+    "relu": lambda x: np.maximum(x, np.float32(0.0)),
+}
+"""What stands between two layers."""
+
+OUTPUTS: dict[str, Callable[[NDArray[np.float32]], NDArray[np.float32]]] = {
+    "clip": lambda x: np.clip(x, np.float32(-1.0), np.float32(1.0)),
+    "tanh": np.tanh,
+}
+"""What keeps the last layer's numbers within the action space."""
+
+NORMALISATION_FLOOR = 1e-8
+"""Added to an observation's variance, as Stable-Baselines3's ``VecNormalize`` does."""
+NORMALISED_LIMIT = 10.0
+"""Bound of a normalised observation, as there."""
+
+
+@dataclass(frozen=True)
+class PolicyCard:
+    """What a policy is and where it comes from; plain values only.
+
+    Attributes
+    ----------
+    env_id : the environment it was trained for, with its version
+    options : those of the environment
+    layout : the observation it takes
+    activation, output : names in ``ACTIVATIONS`` and ``OUTPUTS``
+    seed : of its training
+    settings : of its training
+    training : what came of it: steps, seconds
+    versions : of the packages that trained it
+    """
+
+    env_id: str
+    options: EnvOptions
+    layout: ObservationLayout
+    activation: str = "tanh"
+    output: str = "clip"
+    seed: int = 0
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    training: Mapping[str, Any] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.activation not in ACTIVATIONS:
+            raise ValueError(
+                f"activation must be one of {', '.join(ACTIVATIONS)}, not {self.activation!r}"
+            )
+        if self.output not in OUTPUTS:
+            raise ValueError(f"output must be one of {', '.join(OUTPUTS)}, not {self.output!r}")
+
+
+class Policy:
+    """A multilayer perceptron from observations to actions, with Stable-Baselines3's ``predict``; it needs no torch.
+
+    Parameters
+    ----------
+    card : PolicyCard
+    weights : float32 arrays by name
+        ``layers.<k>.weight`` (outputs, inputs) and ``layers.<k>.bias`` (outputs,) for k = 0, 1, ... The statistics of observations that
+        normalise them: ``observation_mean`` and ``observation_variance`` (features,). ``log_std`` (2,), the logarithm of the
+        standard deviation of actions that are drawn.
+    generator : numpy Generator, optional
+        Draws actions for ``deterministic=False``; seeded by the card's seed otherwise.
+
+    Raises
+    ------
+    ValueError
+        If a weight is missing, unknown, of a wrong shape or type, or not finite.
+    """
+
+    def __init__(
+        self, card: PolicyCard, weights: Weights, generator: np.random.Generator | None = None
+    ) -> None:
+        self.card = card
+        self.weights = dict(weights)
+        self.depth = _require_weights(self.weights, len(card.layout.names))
+        self._scale = 1.0 / np.sqrt(
+            self.weights["observation_variance"].astype(float) + NORMALISATION_FLOOR
+        )
+        self._generator = np.random.default_rng(card.seed) if generator is None else generator
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: State = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.float32], State]:
+        """The network's actions; see ``Agent.predict``. It remembers nothing."""
+        signal = self._normalised(self.card.layout.require(observation))
+        activate = ACTIVATIONS[self.card.activation]
+        for k in range(self.depth):
+            weight, bias = self.weights[f"layers.{k}.weight"], self.weights[f"layers.{k}.bias"]
+            signal = signal @ weight.T + bias
+            if k < self.depth - 1:
+                signal = activate(signal)
+        if not deterministic:
+            deviation = np.exp(self.weights["log_std"])
+            signal = signal + deviation * self._generator.standard_normal(
+                signal.shape, dtype=np.float32
+            )
+        return OUTPUTS[self.card.output](signal), None
+
+    def _normalised(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        centred = (observation - self.weights["observation_mean"].astype(float)) * self._scale
+        return np.clip(centred, -NORMALISED_LIMIT, NORMALISED_LIMIT).astype(np.float32)
+
+
+def _require_weights(weights: Weights, features: int) -> int:
+    """Check names, shapes and values of a network's weights, and return its number of layers."""
+    depth = sum(name.endswith(".weight") for name in weights)
+    if depth == 0:
+        raise ValueError("weights must hold layers.0.weight, but hold no layer")
+    expected: dict[str, tuple[int, ...]] = {
+        "observation_mean": (features,),
+        "observation_variance": (features,),
+        "log_std": (ACTION_SIZE,),
+    }
+    inputs = features
+    for k in range(depth):
+        name = f"layers.{k}.weight"
+        shape = weights[name].shape if name in weights else ()
+        outputs = ACTION_SIZE if k == depth - 1 else (shape[0] if shape else 0)
+        expected[name] = (outputs, inputs)
+        expected[f"layers.{k}.bias"] = (outputs,)
+        inputs = outputs
+    if set(weights) != set(expected):
+        raise ValueError(f"weights must be {sorted(expected)}, not {sorted(weights)}")
+    for name, shape in expected.items():
+        array = weights[name]
+        if array.dtype != np.float32 or array.shape != shape:
+            raise ValueError(
+                f"weight {name} must be float32 of shape {shape}, not {array.dtype} of shape {array.shape}"
+            )
+        if not np.isfinite(array).all():
+            raise ValueError(f"weight {name} must hold finite numbers only")
+    if (weights["observation_variance"] < 0.0).any():
+        raise ValueError("weight observation_variance must not be negative")
+    return depth

@@ -1,0 +1,92 @@
+"""What PPO is trained with: one record of settings for each environment."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from agents.seeds import MOST_WALKERS
+from lean_yaw_env.parameters import require_number
+from lean_yaw_env.registration import ENV_IDS
+
+GAIT_STEP = 0.73
+"""Duration of a step in Table 1's gait, in units of sqrt(leg length / gravity)."""
+
+
+@dataclass(frozen=True)
+class PPOSettings:
+    """Settings of Stable-Baselines3's PPO.
+
+    Attributes
+    ----------
+    steps : environment steps of the training, over all walkers
+    walkers : walkers stepped together
+    steps_per_update : steps of each walker between two updates of the policy
+    batch_size : samples of one gradient step
+    epochs : passes over the samples of an update
+    learning_rate : of Adam, at the start
+    final_learning_rate : share of it that is left at the end; it falls linearly
+    time_constant : simulated time in which a reward's worth falls to 1/e (see ``rollouts``); a step takes 0.73 at the gait
+    gae_lambda : of the generalised advantage estimate
+    clip_range : of the policy's ratio
+    entropy : weight of the entropy bonus
+    value_weight : weight of the value's loss
+    largest_gradient : norm that gradients are clipped to
+    hidden : units of each hidden layer, tanh, of policy and value alike
+    initial_log_std : logarithm of the standard deviation of actions at the start
+    """
+
+    steps: int = 250_000
+    walkers: int = 128
+    steps_per_update: int = 64
+    batch_size: int = 2048
+    epochs: int = 10
+    learning_rate: float = 1e-3
+    final_learning_rate: float = 0.05
+    time_constant: float = 24.0
+    gae_lambda: float = 0.95
+    clip_range: float = 0.2
+    entropy: float = 0.0
+    value_weight: float = 0.5
+    largest_gradient: float = 0.5
+    hidden: tuple[int, ...] = (64, 64)
+    initial_log_std: float = -1.0
+
+    @property
+    def typical_discount(self) -> float:
+        """The discount over a step of the gait's duration, where only one number will do."""
+        return math.exp(-GAIT_STEP / self.time_constant)
+
+    def __post_init__(self) -> None:
+        require_number("walkers", self.walkers, 1, MOST_WALKERS)
+        for name in ("steps", "steps_per_update", "batch_size", "epochs"):
+            require_number(name, getattr(self, name), 1, 10**12)
+        for name in ("final_learning_rate", "gae_lambda"):
+            require_number(name, getattr(self, name), 0.0, 1.0)
+        for name in ("learning_rate", "time_constant", "clip_range", "largest_gradient"):
+            require_number(name, getattr(self, name), 0.0, math.inf, "(]")
+        for name in ("entropy", "value_weight"):
+            require_number(name, getattr(self, name), 0.0, math.inf)
+        require_number("initial_log_std", self.initial_log_std, -20.0, 2.0)
+        if not self.hidden or any(units < 1 for units in self.hidden):
+            raise ValueError(
+                f"hidden must name one layer or more of 1 unit or more, not {self.hidden}"
+            )
+        if (self.walkers * self.steps_per_update) % self.batch_size:
+            raise ValueError(
+                f"batch_size must divide the {self.walkers * self.steps_per_update} samples of an update, not {self.batch_size}"
+            )
+
+
+SETTINGS: dict[str, PPOSettings] = {
+    "LeanYaw/Heading-v0": PPOSettings(),
+    "LeanYaw/Walk-v0": PPOSettings(),
+}
+"""Settings that were tuned for an environment."""
+
+
+def settings_for(env_id: str) -> PPOSettings:
+    """An environment's settings; the default ones where none were tuned. ``ValueError`` for an id there is not."""
+    if env_id not in ENV_IDS:
+        raise ValueError(f"env_id must be one of {', '.join(ENV_IDS)}, not {env_id!r}")
+    return SETTINGS.get(env_id, PPOSettings())

@@ -1,0 +1,229 @@
+"""Policies on disk: ``policy.json`` says what it is, ``policy.safetensors`` holds its numbers; neither can hold code."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import safetensors.numpy
+from safetensors import SafetensorError
+
+from agents.files import read_json, write_json
+from agents.observations import ObservationLayout
+from agents.policy import Policy, PolicyCard
+from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.parameters import WalkerParameters
+from lean_yaw_env.registration import ENV_IDS, NAMESPACE
+from lean_yaw_env.rendering.files import written_whole
+
+CARD_FILE = "policy.json"
+WEIGHTS_FILE = "policy.safetensors"
+FORMAT = "lean-yaw-policy"
+FORMAT_VERSION = 1
+SHIPPED = Path(__file__).parent / "trained"
+"""Agents that come with the package, as ``<Task>-v<version>/seed<k>/``."""
+
+_KEYS: dict[str, type] = {
+    "format": str,
+    "format_version": int,
+    "env_id": str,
+    "options": dict,
+    "observation": dict,
+    "activation": str,
+    "output": str,
+    "seed": int,
+    "settings": dict,
+    "training": dict,
+    "versions": dict,
+    "weights_sha256": str,
+}
+
+
+class PolicyFileError(ValueError):
+    """Files that hold no policy for this package's environments; the message says what is wrong and what to do."""
+
+
+def save(policy: Policy, folder: Path) -> None:
+    """Write a policy into a folder, which is made if it is not there; each file whole, the weights first."""
+    folder.mkdir(parents=True, exist_ok=True)
+    card = policy.card
+    data = safetensors.numpy.save(policy.weights)
+    with written_whole(folder / WEIGHTS_FILE) as temporary:
+        temporary.write_bytes(data)
+    write_json(
+        folder / CARD_FILE,
+        {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "env_id": card.env_id,
+            "options": options_to_plain(card.options),
+            "observation": asdict(card.layout),
+            "activation": card.activation,
+            "output": card.output,
+            "seed": card.seed,
+            "settings": dict(card.settings),
+            "training": dict(card.training),
+            "versions": dict(card.versions),
+            "weights_sha256": hashlib.sha256(data).hexdigest(),
+        },
+    )
+
+
+def load(source: str | Path, *, env_id: str | None = None, seed: int | None = None) -> Policy:
+    """Load a policy; reads numbers and names only and runs no code from the files.
+
+    Parameters
+    ----------
+    source : an environment's id, for the agent that comes with the package, or a folder
+    env_id : str, optional
+        The environment that the policy is wanted for.
+    seed : int, optional
+        Which of the package's agents for that id; the lowest seed there is otherwise.
+
+    Raises
+    ------
+    PolicyFileError
+        If there is no policy, a file is damaged or not of this format, or it was trained for another environment, version or
+        observation.
+    """
+    name = str(source)
+    if name.startswith(f"{NAMESPACE}/"):
+        require_env_id(name)
+        folder = shipped_folder(name, seed)
+        env_id = name if env_id is None else env_id
+    else:
+        folder = Path(source)
+    try:
+        card, digest = _read_card(folder / CARD_FILE)
+        if env_id is not None and card.env_id != env_id:
+            raise ValueError(
+                f"the policy was trained for {card.env_id}, not for {env_id}; train one for it by train.py"
+            )
+        return Policy(card, _read_weights(folder / WEIGHTS_FILE, digest))
+    except PolicyFileError:
+        raise
+    except (ValueError, TypeError) as error:
+        raise PolicyFileError(f"no policy can be loaded from {str(folder)!r}: {error}") from error
+
+
+def shipped_folder(env_id: str, seed: int | None = None) -> Path:
+    """The folder of an agent that comes with the package, or ``PolicyFileError`` if there is none."""
+    home = SHIPPED / env_id.removeprefix(f"{NAMESPACE}/")
+    found = sorted(
+        (int(folder.name.removeprefix("seed")), folder)
+        for folder in home.glob("seed*")
+        if folder.name.removeprefix("seed").isdigit()
+    )
+    for number, folder in found:
+        if seed is None or number == seed:
+            return folder
+    wanted = "" if seed is None else f" with seed {seed}"
+    raise PolicyFileError(
+        f"no trained agent for {env_id}{wanted} comes with this package; train one by train.py"
+    )
+
+
+def require_env_id(env_id: str) -> str:
+    """The id of an environment of this package, or ``PolicyFileError`` that says what to do."""
+    if env_id in ENV_IDS:
+        return env_id
+    name, _, _ = env_id.partition("-v")
+    versions = [known for known in ENV_IDS if known.startswith(f"{name}-v")]
+    if versions:
+        raise PolicyFileError(
+            f"this package's environment is {versions[0]}, not {env_id}: their observations or rewards differ; "
+            "train a policy anew or install the package that trained it"
+        )
+    raise PolicyFileError(f"env_id must be one of {', '.join(ENV_IDS)}, not {env_id!r}")
+
+
+def task_of(env_id: str) -> str:
+    """The task's name in an environment's id."""
+    return env_id.removeprefix(f"{NAMESPACE}/").partition("-v")[0]
+
+
+def options_to_plain(options: EnvOptions) -> dict[str, Any]:
+    """The options that are not the default's, as plain values."""
+    plain = _changed(options)
+    if options.parameters is not None:
+        plain["parameters"] = _changed(options.parameters)
+    return plain
+
+
+def options_from_plain(plain: dict[str, Any]) -> EnvOptions:
+    """The options that ``options_to_plain`` wrote, or ``ValueError``."""
+    values = dict(plain)
+    if "parameters" in values:
+        values["parameters"] = WalkerParameters(
+            **_known("parameters", values["parameters"], WalkerParameters)
+        )
+    return EnvOptions(**_known("options", values, EnvOptions))
+
+
+def _changed(record: Any) -> dict[str, Any]:
+    default = type(record)()
+    return {
+        field.name: getattr(record, field.name)
+        for field in fields(record)
+        if getattr(record, field.name) != getattr(default, field.name)
+    }
+
+
+def _known(name: str, values: Any, record: type) -> dict[str, Any]:
+    names = [field.name for field in fields(record)]
+    if not isinstance(values, dict) or not set(values) <= set(names):
+        raise ValueError(f"{name} must hold {', '.join(names)} only, not {values!r}")
+    return values
+
+
+def _read_card(path: Path) -> tuple[PolicyCard, str]:
+    """What the JSON says, checked, and the digest of the weights."""
+    values = read_json(path)
+    if not isinstance(values, dict) or values.get("format") != FORMAT:
+        raise ValueError(f"{path.name} is not a policy's: its format must be {FORMAT!r}")
+    if values.get("format_version") != FORMAT_VERSION:
+        raise ValueError(
+            f"{path.name} has format version {values.get('format_version')!r}, and this package reads {FORMAT_VERSION}"
+        )
+    if set(values) != set(_KEYS):
+        raise ValueError(f"{path.name} must hold {', '.join(_KEYS)}; not {', '.join(values)}")
+    for key, kind in _KEYS.items():
+        if not isinstance(values[key], kind) or isinstance(values[key], bool):
+            raise ValueError(f"{path.name}: {key} must be of type {kind.__name__}")
+    env_id = require_env_id(values["env_id"])
+    options = options_from_plain(values["options"])
+    layout = ObservationLayout.of(task_of(env_id), options)
+    if values["observation"] != _listed(asdict(layout)):
+        raise ValueError(
+            f"it was trained on other observations, {values['observation']}, than {env_id} now gives, {_listed(asdict(layout))}; "
+            "train a policy anew"
+        )
+    card = PolicyCard(
+        env_id=env_id,
+        options=options,
+        layout=layout,
+        **{key: values[key] for key in _CARD_VALUES},
+    )
+    return card, values["weights_sha256"]
+
+
+_CARD_VALUES = ("activation", "output", "seed", "settings", "training", "versions")
+
+
+def _listed(values: dict[str, Any]) -> dict[str, Any]:
+    return {key: list(value) for key, value in values.items()}
+
+
+def _read_weights(path: Path, digest: str) -> dict[str, Any]:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path.name} cannot be read: {error}") from error
+    if hashlib.sha256(data).hexdigest() != digest:
+        raise ValueError(f"{path.name} is not the file that {CARD_FILE} was written with")
+    try:
+        return safetensors.numpy.load(data)
+    except SafetensorError as error:
+        raise ValueError(f"{path.name} is damaged: {error}") from error

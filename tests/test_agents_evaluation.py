@@ -1,0 +1,156 @@
+"""The evaluator: the same episodes for all, means and intervals that mean what they say, and what is printed."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scipy import stats
+from typer.testing import CliRunner
+
+from agents import FixedController, HeadingFeedback, RandomController, evaluation
+from agents.evaluate import app
+from agents.evaluation import evaluate, mean_interval, run_episodes, summary, survival_interval
+from agents.seeds import (
+    EVALUATION_SEEDS,
+    MOST_EPISODES,
+    MOST_WALKERS,
+    TRAINING_SEEDS,
+    TUNING_SEEDS,
+    evaluation_seed,
+    training_seed,
+)
+from agents.tables import results_table, rows_to_json
+from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.envs.walker_env import WalkerEnv
+
+SHORT = EnvOptions(horizon=15.0)
+
+
+def test_seeds_of_training_tuning_and_evaluation_share_no_episode():
+    assert training_seed(TRAINING_SEEDS - 1) + MOST_WALKERS <= TUNING_SEEDS
+    assert TUNING_SEEDS + MOST_EPISODES <= EVALUATION_SEEDS == evaluation_seed(0)
+    assert training_seed(1) == training_seed(0) + MOST_WALKERS
+    assert evaluation_seed(1) == evaluation_seed(0) + MOST_EPISODES
+
+
+def test_an_evaluated_episode_is_the_single_environment_s():
+    results = run_episodes(HeadingFeedback(), "Heading", episodes=3, seed=2, options=SHORT)
+    env = WalkerEnv("Heading", horizon=15.0)
+    for i in range(3):
+        observation, info = env.reset(seed=evaluation_seed(2) + i)
+        total, ends = 0.0, False
+        while not ends:
+            action, _ = HeadingFeedback().predict(observation)
+            observation, reward, terminated, truncated, info = env.step(action)
+            total += reward
+            ends = terminated or truncated
+        assert results.survived[i] == truncated
+        # the same sums of the same numbers; actions of one row or of three are the same float32
+        assert results.metrics["return"][i] == total
+        for name in ("mean_absolute_heading_error", "settled_fraction"):
+            assert results.metrics[name][i] == info[name]
+        assert results.metrics["speed"][i] == info["distance"] / info["time"]
+
+
+def test_episodes_do_not_depend_on_how_many_are_walked_together(monkeypatch):
+    whole = run_episodes(FixedController(), "Heading", episodes=5, options=SHORT)
+    monkeypatch.setattr(evaluation, "_CHUNK", 2)
+    parts = run_episodes(FixedController(), "Heading", episodes=5, options=SHORT)
+    for name, values in whole.metrics.items():
+        assert np.array_equal(values, parts.metrics[name], equal_nan=True)
+
+
+def test_another_seed_draws_other_episodes_and_the_same_seed_the_same():
+    returns = [
+        run_episodes(FixedController(), "Heading", episodes=4, seed=seed, options=SHORT).metrics["return"]
+        for seed in (0, 0, 1)
+    ]  # fmt: skip
+    assert np.array_equal(returns[0], returns[1])
+    assert not np.intersect1d(returns[0], returns[2]).size
+
+
+def test_the_bootstrap_interval_is_near_student_s_on_normal_values():
+    values = np.random.default_rng(0).normal(3.0, 2.0, 400)
+    mean, low, high = mean_interval(values)
+    expected = stats.t.interval(0.95, 399, values.mean(), stats.sem(values))
+    assert mean == values.mean()
+    # 2000 resamples place a 2.5 % quantile within some 4 % of the interval's half width
+    half = 0.5 * (expected[1] - expected[0])
+    assert (low, high) == pytest.approx(expected, abs=0.1 * half)
+
+
+def test_undefined_episodes_are_left_out_of_a_mean_and_constant_values_have_no_spread():
+    assert mean_interval(np.array([2.0, np.nan, 2.0])) == (2.0, 2.0, 2.0)
+    assert all(np.isnan(value) for value in mean_interval(np.array([np.nan])))
+
+
+def test_the_interval_of_a_full_survival_still_has_a_width():
+    low, high = survival_interval(np.ones(100, dtype=bool))
+    # Wilson (1927) with all successes: n / (n + z^2)
+    assert low == pytest.approx(100 / (100 + stats.norm.ppf(0.975) ** 2), rel=1e-12)
+    assert high == 1.0
+
+
+def test_settling_is_undefined_where_no_command_was_settled_rather_than_zero():
+    results = run_episodes(
+        FixedController(), "Heading", episodes=32, options=EnvOptions(horizon=5.0)
+    )
+    settled = results.metrics["settled_fraction"] > 0.0
+    assert not settled.all()
+    assert np.isnan(results.metrics["mean_settling_time"][~settled]).all()
+    assert np.isfinite(results.metrics["mean_settling_time"][settled]).all()
+
+
+def test_survival_stands_beside_every_metric():
+    wild = EnvOptions(horizon=40.0, max_offset_change=0.1)
+    results = run_episodes(RandomController(0), "Heading", episodes=16, options=wild)
+    assert 0.0 < results.survived.mean() < 1.0
+    rows = summary("Heading", "random", results)
+    assert {row.survival for row in rows} == {results.survived.mean()}
+    assert rows[-1].metric == "survival"
+    assert {row.episodes for row in rows} == {16}
+
+
+def test_the_table_and_the_json_hold_every_row():
+    agents = {"fixed": FixedController(), "random": RandomController()}
+    rows = evaluate("Heading", agents, episodes=4, options=SHORT)
+    plain = json.loads(rows_to_json(rows))
+    assert [(row["agent"], row["metric"]) for row in plain] == [(r.agent, r.metric) for r in rows]
+    assert set(plain[0]) == {"task", "agent", "metric", "mean", "low", "high", "survival", "episodes"}  # fmt: skip
+    table = results_table(rows)
+    assert [column.header for column in table.columns] == ["metric", "fixed", "random"]
+    assert table.row_count == len({row.metric for row in rows})
+
+
+def test_the_command_line_takes_agents_one_after_the_other():
+    arguments = ["--task", "Walk", "--agents", "fixed", "random", "--episodes", "2", "--seed", "1", "--json"]  # fmt: skip
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    rows = json.loads(result.stdout)
+    assert list(dict.fromkeys(row["agent"] for row in rows)) == ["fixed", "random"]
+    assert {row["task"] for row in rows} == {"Walk"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--task", "Fly"], "task must be one of"),
+        (["--agents", "nobody"], "agents must be among"),
+        (["--agents", "fixed", "--episodes", "0"], "episodes must be in"),
+        (["--agents", "fixed", "--seed", "-1"], "seed must be in"),
+        (["--agents", "ppo", "--agent-path", "nowhere"], "there is no file"),
+    ],
+)
+def test_the_command_line_refuses_bad_values_by_name(arguments, message):
+    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "400"})
+    assert result.exit_code == 2
+    assert message in result.output
+
+
+def test_no_agents_and_bad_numbers_are_refused():
+    with pytest.raises(ValueError, match="agents must hold one"):
+        evaluate("Heading", {}, episodes=1)
+    with pytest.raises(ValueError, match="task must be one of"):
+        run_episodes(FixedController(), "Nothing", episodes=1)

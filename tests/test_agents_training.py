@@ -1,0 +1,265 @@
+"""Training: discounts in time, exact resumption, and what a run leaves behind."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from gymnasium import spaces
+from typer.testing import CliRunner
+
+import train
+from agents import load, ppo
+from agents.checkpoint import CheckpointError, read_checkpoint, write_checkpoint
+from agents.evaluate import app as evaluate_app
+from agents.ppo import train_ppo
+from agents.ppo_settings import SETTINGS, PPOSettings, settings_for
+from agents.rollouts import TimeDiscountedBuffer
+from agents.training import Training, new_run, read_run, resumed_run, run, started_run
+from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.registration import ENV_IDS
+
+ID = "LeanYaw/Heading-v0"
+TINY = PPOSettings(
+    steps=1280, walkers=8, steps_per_update=32, batch_size=128, epochs=2, hidden=(8, 8)
+)
+# episodes of some twenty steps, so that training sees ends and restarts
+SHORT = EnvOptions(horizon=15.0)
+CPU = torch.device("cpu")
+
+
+def filled_buffer(rate: float, durations: np.ndarray, values: float, constant: float):
+    """A buffer of one walker whose every step earns ``rate`` times its duration."""
+    size = len(durations)
+    space = spaces.Box(-1.0, 1.0, (1,), np.float32)
+    buffer = TimeDiscountedBuffer(size, space, space, CPU, gae_lambda=1.0, n_envs=1, time_constant=constant)  # fmt: skip
+    for duration in durations:
+        buffer.durations[buffer.pos] = duration
+        buffer.add(
+            np.zeros((1, 1)), np.zeros((1, 1)), np.array([rate * duration]),
+            np.array([False]), torch.tensor([values]), torch.tensor([0.0]),
+        )  # fmt: skip
+    return buffer
+
+
+@pytest.mark.parametrize("step", [0.2, 0.73, 3.0])
+def test_a_steady_rate_is_worth_the_same_whatever_the_steps_length(step):
+    rate, constant = 0.8, 24.0
+    worth = rate * constant  # the integral of rate exp(-t / constant)
+    buffer = filled_buffer(rate, np.full(50, step), worth, constant)
+    buffer.compute_returns_and_advantage(torch.tensor([worth]), np.array([False]))
+    # at its own worth nothing surprises; float32 values of about 20
+    assert np.abs(buffer.advantages).max() < 2e-4
+    assert buffer.returns == pytest.approx(np.full((50, 1), worth), rel=1e-5)
+
+
+def test_returns_of_uneven_steps_are_the_discounted_integral():
+    rate, constant = 0.5, 10.0
+    durations = np.random.default_rng(0).uniform(0.3, 1.5, 20)
+    buffer = filled_buffer(rate, durations, 0.0, constant)
+    buffer.compute_returns_and_advantage(torch.tensor([0.0]), np.array([False]))
+    left = durations[::-1].cumsum()[::-1]
+    expected = rate * constant * (1.0 - np.exp(-left / constant))
+    assert buffer.returns[:, 0] == pytest.approx(expected, rel=1e-5)  # float32
+
+
+def test_nothing_after_an_episode_s_end_counts():
+    buffer = filled_buffer(1.0, np.array([1.0, 0.0, 1.0]), 5.0, 10.0)
+    buffer.episode_starts[2] = 1.0  # the second step ended an episode with a reward of 0
+    buffer.compute_returns_and_advantage(torch.tensor([1e6]), np.array([True]))
+    assert buffer.returns[1, 0] == 0.0
+    assert buffer.returns[2, 0] == pytest.approx(10.0 * (1.0 - np.exp(-0.1)), rel=1e-6)  # float32
+
+
+class Interruption(Exception):
+    """In place of a key pressed or a power cut."""
+
+
+def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, monkeypatch):
+    whole = train_ppo(ID, TINY, seed=3, options=SHORT, progress=False)
+    checkpoint = tmp_path / "checkpoint.safetensors"
+    arguments = {"seed": 3, "options": SHORT, "checkpoint": checkpoint, "checkpoint_seconds": 0.0, "progress": False}  # fmt: skip
+    original = ppo._Keeper._on_step
+
+    def interrupted(keeper) -> bool:
+        if keeper.num_timesteps > 800:  # in the midst of collecting experience
+            raise Interruption
+        return original(keeper)
+
+    monkeypatch.setattr(ppo._Keeper, "_on_step", interrupted)
+    with pytest.raises(Interruption):
+        train_ppo(ID, TINY, **arguments)
+    monkeypatch.setattr(ppo._Keeper, "_on_step", original)
+    assert int(read_checkpoint(checkpoint)["count.steps"]) == 768  # the last update before
+    np.random.seed(99)  # noqa: NPY002 - the resumed training must not depend on it
+    torch.manual_seed(99)
+    resumed = train_ppo(ID, TINY, **arguments)
+    for name, weight in whole.policy.weights.items():
+        assert np.array_equal(weight, resumed.policy.weights[name]), name
+    assert np.array_equal(whole.log.steps, resumed.log.steps)
+    assert np.array_equal(whole.log.returns, resumed.log.returns)
+    assert len(whole.log.returns) > TINY.walkers
+    assert resumed.policy.card.training["steps"] == TINY.steps
+
+
+def test_seeds_decide_a_training_and_different_ones_differ():
+    small = PPOSettings(steps=256, walkers=8, steps_per_update=32, batch_size=128, epochs=1)
+    one, same, other = (
+        train_ppo(ID, small, seed=seed, options=SHORT, progress=False).policy.weights
+        for seed in (0, 0, 1)
+    )
+    assert np.array_equal(one["layers.0.weight"], same["layers.0.weight"])
+    assert not np.array_equal(one["layers.0.weight"], other["layers.0.weight"])
+
+
+def test_training_leaves_torch_s_threads_as_they_were():
+    before = torch.get_num_threads()
+    small = PPOSettings(steps=64, walkers=4, steps_per_update=16, batch_size=64, epochs=1)
+    train_ppo(ID, small, threads=2, progress=False)
+    assert torch.get_num_threads() == before
+
+
+def test_a_checkpoint_of_another_training_or_a_damaged_one_is_refused(tmp_path):
+    path = tmp_path / "checkpoint.safetensors"
+    train_ppo(ID, TINY, options=SHORT, checkpoint=path, progress=False)
+    other = PPOSettings(**vars(TINY) | {"hidden": (16, 16), "steps": 2560})
+    with pytest.raises(CheckpointError, match="not of a training with these settings"):
+        train_ppo(ID, other, options=SHORT, checkpoint=path, progress=False)
+    arrays = read_checkpoint(path)
+    del arrays["log.returns"]
+    write_checkpoint(path, arrays)
+    with pytest.raises(CheckpointError, match="holds no log"):
+        train_ppo(ID, TINY, options=SHORT, checkpoint=path, progress=False)
+    path.write_bytes(b"nothing of the kind")
+    with pytest.raises(CheckpointError, match="no checkpoint can be read"):
+        train_ppo(ID, TINY, options=SHORT, checkpoint=path, progress=False)
+
+
+def test_a_checkpoint_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    path = tmp_path / "checkpoint.safetensors"
+    write_checkpoint(path, {"a": np.arange(3)})
+
+    def broken(self: Path, data: bytes) -> int:
+        raise OSError("no space left")
+
+    monkeypatch.setattr(Path, "write_bytes", broken)
+    with pytest.raises(OSError, match="no space left"):
+        write_checkpoint(path, {"a": np.arange(4)})
+    assert np.array_equal(read_checkpoint(path)["a"], np.arange(3))
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def tiny_training(**changes) -> Training:
+    return Training(ID, 0, TINY, SHORT, **{"episodes": 4, "checkpoint_seconds": 0.0} | changes)
+
+
+def test_a_run_leaves_agent_statistics_settings_pictures_and_judgement(tmp_path):
+    folder = new_run(tiny_training(), tmp_path)
+    assert read_run(folder) == tiny_training()
+    result = run(folder, progress=False)
+    names = {path.name for path in folder.iterdir()}
+    assert names == {
+        "run.json", "checkpoint.safetensors", "policy.json", "policy.safetensors", "episodes.csv",
+        "observation_statistics.json", "learning_curve.png", "footprints.png", "evaluation.json",
+    }  # fmt: skip
+    assert {row.agent for row in result.rows} == {"random", "fixed", "feedback", "ppo"}
+    statistics = json.loads((folder / "observation_statistics.json").read_text())
+    assert list(statistics) == list(result.policy.card.layout.names)
+    record = json.loads((folder / "run.json").read_text())
+    assert record["seed"] == 0
+    assert record["settings"]["steps"] == TINY.steps
+    observation = np.zeros((1, 7))
+    loaded = load(folder, env_id=ID)
+    assert np.array_equal(loaded.predict(observation)[0], result.policy.predict(observation)[0])
+    lines = (folder / "episodes.csv").read_text().splitlines()
+    assert lines[0] == "steps,return,length,survived"
+    assert len(lines) > TINY.walkers
+
+
+def test_finished_runs_are_not_resumed_and_unfinished_ones_are_found(tmp_path):
+    with pytest.raises(ValueError, match="no unfinished training of Heading"):
+        resumed_run("Heading", tmp_path)
+    folder = new_run(tiny_training(), tmp_path)
+    assert resumed_run("Heading", tmp_path) == folder
+    with pytest.raises(ValueError, match="no unfinished training of Walk"):
+        resumed_run("Walk", tmp_path)
+    with pytest.raises(ValueError, match="leave out seed"):
+        resumed_run("Heading", tmp_path, None, {"seed": 1})
+    for name in ("evaluation.json", "policy.json"):
+        (folder / name).write_text("{}")
+    with pytest.raises(ValueError, match="is finished"):
+        resumed_run("Heading", tmp_path, folder)
+
+
+def test_a_damaged_run_is_refused(tmp_path):
+    folder = new_run(tiny_training(), tmp_path)
+    (folder / "run.json").write_text("[]")
+    with pytest.raises(ValueError, match="is not a run's"):
+        read_run(folder)
+    with pytest.raises(ValueError, match="run must not be given without --resume"):
+        started_run("Heading", tmp_path, folder)
+
+
+def test_the_command_line_trains_judges_and_is_found_by_the_evaluator(tmp_path):
+    arguments = ["--task", "Walk", "--steps", "8192", "--episodes", "2", "--out", str(tmp_path)]
+    result = CliRunner().invoke(train.app, arguments, env={"COLUMNS": "200"})
+    assert result.exit_code == 0, result.output
+    assert "ppo" in result.output
+    again = CliRunner().invoke(train.app, ["--task", "Walk", "--resume", "--out", str(tmp_path)], env={"COLUMNS": "400"})  # fmt: skip
+    assert again.exit_code == 2
+    assert "no unfinished training" in again.output
+    judged = CliRunner().invoke(
+        evaluate_app,
+        ["--task", "Walk", "--agents", "ppo", "--episodes", "2", "--runs", str(tmp_path), "--json"],
+    )
+    assert judged.exit_code == 0, judged.output
+    assert {row["agent"] for row in json.loads(judged.stdout)} == {"ppo"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--task", "Fly"], "task must be one of"),
+        (["--steps", "0"], "steps must be in"),
+        (["--seed", "-1"], "seed must be in"),
+        (["--episodes", "0"], "episodes must be in"),
+        (["--threads", "0"], "threads must be in"),
+    ],
+)
+def test_the_command_line_refuses_bad_values_before_anything_is_written(
+    tmp_path, arguments, message
+):
+    result = CliRunner().invoke(train.app, [*arguments, "--out", str(tmp_path)], env={"COLUMNS": "400"})  # fmt: skip
+    assert result.exit_code == 2
+    assert message in result.output
+    assert not list(tmp_path.iterdir())
+
+
+def test_every_option_of_the_command_line_is_explained():
+    for app, options in [
+        (train.app, ("--task", "--seed", "--steps", "--out", "--resume", "--run", "--threads")),
+        (evaluate_app, ("--task", "--agents", "--episodes", "--seed", "--json", "--agent-path")),
+    ]:
+        result = CliRunner().invoke(app, ["--help"], env={"COLUMNS": "200"})
+        assert result.exit_code == 0
+        assert all(option in result.output for option in options)
+
+
+def test_every_environment_has_settings_and_bad_ones_are_refused():
+    assert set(SETTINGS) <= set(ENV_IDS)
+    assert all(isinstance(settings_for(env_id), PPOSettings) for env_id in ENV_IDS)
+    with pytest.raises(ValueError, match="env_id must be one of"):
+        settings_for("CartPole-v1")
+    for values, message in [
+        ({"batch_size": 1000}, "batch_size must divide the 8192 samples"),
+        ({"walkers": 0}, "walkers must be in"),
+        ({"time_constant": 0.0}, "time_constant must be in"),
+        ({"gae_lambda": 1.5}, "gae_lambda must be in"),
+        ({"hidden": ()}, "hidden must name one layer"),
+        ({"initial_log_std": float("nan")}, "initial_log_std must be in"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            PPOSettings(**values)
