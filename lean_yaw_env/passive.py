@@ -62,7 +62,7 @@ class PassiveFall(str, Enum):
     FORWARD = "forward"
     """The leg tips over forward until the floor no longer holds it, the swing foot not down."""
     SIDEWAYS = "sideways"
-    """An ankle would turn past a right angle, or the walker comes down not moving forward."""
+    """An ankle would turn past a right angle, or the walker goes down past mid-stance, not forward."""
     LIFT_OFF = "lift-off"
     """The normal force vanishes before mid-stance: the walker is too fast for its weight."""
     SLIP = "slip"
@@ -311,7 +311,7 @@ def require_passive_state(state: ArrayLike, *, planar: bool = False, name: str =
 def step_passive_rows(
     walker: PassiveWalker, states: Vector, sides: ArrayLike, inter_leg_angles: ArrayLike
 ) -> Vector:
-    """Step many states of one walker, unchecked; rows (n, 20) in the order of ``PassiveOutcome``.
+    """Step many states of one walker, unchecked; rows (n, 19) in the order of ``PassiveOutcome``.
 
     Parameters
     ----------

@@ -356,7 +356,8 @@ class PassiveMap:
             raise_for_failure(status, state, self.walker.parameters)
             if status != STEPPED:
                 fall = fall_of(status, after[1])
-                raise FellError(f"the walker fell {fall.value if fall else ''} in step {k + 1}")
+                how = f"fell {fall.value}" if fall else "has no trailing foot on the floor"
+                raise FellError(f"the walker {how} in step {k + 1}")
             by_body = rows[:, :size] @ by_body + rows[:, size:]
             matrix = rows[:, :size] @ matrix
             state, foot = after.copy(), OTHER_FOOT[foot]

@@ -60,10 +60,8 @@ LANDING_WINDOW = 1e-5
 SHORTEST_DOUBT = 1e-3
 # How far from the floor the trailing foot may be left by the solver of the start.
 START_RESIDUAL = 1e-12
-STATE_SIZE = 6
 # Columns of the derivatives: the section state, then the body's constants that are differentiable.
 INPUTS = 12
-RESULTS = 20
 _TINY = 1e-30
 
 
@@ -120,7 +118,6 @@ class PassiveOutcome(NamedTuple):
     ankle_loss: float
     start_inter_leg_angle: float
     evaluations: float
-    closing_speed: float
 
 
 @inlined
@@ -221,7 +218,9 @@ def _advance(c, flight):
     status = FAILED if attempts >= MOST_ATTEMPTS else FLYING
     if accepted:
         status = NO_STRIKE if time.real >= c.max_duration.real else status
-        status = BACKWARD if (w.real >= 0.0) & (dw.real >= 0.0) else status
+        # rolling back with the hip past its foot already is going down on one side
+        rolls_back = (w.real >= 0.0) & (dw.real >= 0.0)
+        status = (BACKWARD if x.real > 0.0 else SIDEWAYS) if rolls_back else status
         status = LANDING if landed else status
         cos_b = sine_cosine(b)[1]
         status = SIDEWAYS if cos_b.real <= 0.0 else status
@@ -262,7 +261,7 @@ def _touch_down(c, flight):
     """
     time, x, b, d = flight.time, flight.pitch, flight.twist, flight.inter_leg
     w, v, u = flight.pitch_rate, flight.twist_rate, flight.inter_leg_rate
-    gap, gap_rate = flight.gap, flight.gap_rate
+    gap = flight.gap
     for _ in range(2):
         dw, dv, du = swinging_accelerations(c, x, b, d, w, v, u)
         gap, gap_rate, _, _ = swinging_gap(c, x, b, d, w, v, u, dw, dv, du)
@@ -274,7 +273,7 @@ def _touch_down(c, flight):
         w = w + correction * dw
         v = v + correction * dv
         u = u + correction * du
-    return time, x, b, d, w, v, u, gap, gap_rate
+    return time, x, b, d, w, v, gap
 
 
 @inlined
@@ -315,7 +314,7 @@ def _gravity_work(c, flight, x, b):
 @inlined
 def _strike(c, heading, flight):
     """The outcome of a flight that lands."""
-    time, x, b, d, w, v, _, gap, closing = _touch_down(c, flight)
+    time, x, b, d, w, v, gap = _touch_down(c, flight)
     held = with_inter_leg_angle(c, d)
     sin_a, cos_a = sine_cosine(x + c.tilt)
     sin_b, cos_b = sine_cosine(b)
@@ -358,7 +357,6 @@ def _strike(c, heading, flight):
         flight.start_kinetic + gravity_work - before,
         flight.start_inter_leg,
         13.0 * flight.attempts,
-        -closing,
     )
 
 
@@ -386,7 +384,6 @@ def _fall(c, heading, flight):
         nothing,
         flight.start_inter_leg,
         13.0 * flight.attempts,
-        nothing,
     )
 
 
@@ -407,7 +404,7 @@ def passive_batch(bodies, states, inter_legs, sides, results, first, last):
     """Step walkers ``first`` to ``last`` - 1.
 
     ``bodies`` (1 or n, 11), ``states`` (n, 6), ``inter_legs`` (n,) of angles or NaN for both feet
-    down, ``sides`` (n,), ``results`` (n, 20) in the order of ``PassiveOutcome``.
+    down, ``sides`` (n,), ``results`` (n, 19) in the order of ``PassiveOutcome``.
     """
     for i in range(first, last):
         p = bodies[i if bodies.shape[0] > 1 else 0]
@@ -434,7 +431,6 @@ def passive_batch(bodies, states, inter_legs, sides, results, first, last):
         row[16] = outcome.ankle_loss
         row[17] = outcome.start_inter_leg_angle
         row[18] = outcome.evaluations
-        row[19] = outcome.closing_speed
 
 
 @entry_point()
