@@ -1,0 +1,151 @@
+"""Many walkers at once: bit for bit as one by one, in any number, order, split and number of threads; bad input."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lean_yaw_env import Walker, WalkerParameters
+from lean_yaw_env.batch import BatchResult, bodies_of, step_batch
+from lean_yaw_env.errors import SolverError
+from lean_yaw_env.kernel import records
+from lean_yaw_env.kernel.records import Body, Outcome
+from lean_yaw_env.kernel.step import step as step_kernel
+from lean_yaw_env.parameters import Vector
+from tests.test_kernel_falls import _random_walkers
+
+
+def _single(bodies: Vector, states: Vector, sides: Vector, commands: dict[str, Vector]) -> Vector:
+    outcomes = np.empty((len(states), len(Outcome._fields)))
+    for i in range(len(states)):
+        command = np.array(
+            [commands[k][i] for k in ("inter_leg_angles", "mass_offsets", "previous_offsets")]
+        )
+        step_kernel(bodies[i], command, states[i], sides[i], outcomes[i])
+    return outcomes
+
+
+def _same_bits(a: Vector, b: Vector) -> bool:
+    return bool((a.view(np.uint64) == b.view(np.uint64)).all())
+
+
+def test_a_batch_has_the_bits_of_its_walkers_one_by_one() -> None:
+    bodies, states, sides, commands = _random_walkers(6_001, 3)
+    result = step_batch(bodies, states, sides, **commands)
+    assert len(set(result.statuses)) == 7  # every end is among them
+    assert _same_bits(result.outcomes, _single(bodies, states, sides, commands))
+
+
+def test_a_batch_around_the_gait_has_the_bits_of_its_walkers_one_by_one(gait: Vector) -> None:
+    rng = np.random.default_rng(4)
+    n = 2_000
+    bodies = np.tile(np.array(WalkerParameters().body()), (n, 1))
+    states = gait * rng.uniform(0.5, 1.5, (n, 5))
+    sides = np.where(rng.random(n) < 0.5, 1.0, -1.0)
+    before = rng.uniform(-0.05, 0.05, n)
+    commands = {
+        "inter_leg_angles": rng.uniform(0.15, 0.45, n),
+        "previous_offsets": before,
+        "mass_offsets": before + rng.uniform(-0.005, 0.005, n) * (rng.random(n) < 0.5),
+    }
+    result = step_batch(bodies, states, sides, **commands)
+    assert _same_bits(result.outcomes, _single(bodies, states, sides, commands))
+    one_body = step_batch(WalkerParameters(), states, sides, **commands)
+    assert _same_bits(result.outcomes, one_body.outcomes)
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 8, 9, 63, 64, 65, 129])
+def test_no_walker_depends_on_how_many_others_there_are(n: int) -> None:
+    bodies, states, sides, commands = _random_walkers(200, 5)
+    whole = step_batch(bodies, states, sides, **commands)
+    part = step_batch(
+        bodies[:n], states[:n], sides[:n], **{k: v[:n] for k, v in commands.items()}
+    )  # fmt: skip
+    assert _same_bits(part.outcomes, whole.outcomes[:n])
+
+
+@pytest.mark.parametrize("threads", [2, 3, 5])
+def test_threads_change_no_bit(threads: int) -> None:
+    bodies, states, sides, commands = _random_walkers(3_001, 6)
+    one = step_batch(bodies, states, sides, **commands)
+    many = step_batch(bodies, states, sides, threads=threads, **commands)
+    assert _same_bits(one.outcomes, many.outcomes)
+
+
+def test_no_walkers_give_no_outcomes() -> None:
+    result = step_batch(WalkerParameters(), np.empty((0, 5)), 1.0)
+    assert result.states.shape == (0, 5)
+    assert not result.stepped.any()
+
+
+def test_the_friendly_single_step_says_the_same(gait: Vector) -> None:
+    result = step_batch(WalkerParameters(), [gait], -1.0, mass_offsets=0.02, previous_offsets=0.01)
+    single = Walker().step(gait, stance="right", mass_offset=0.02, previous_offset=0.01)
+    assert (result.states[0] == single.state).all()
+    assert result.duration[0] == single.duration
+    assert result.least_normal_force[0] == single.normal_force
+    assert (result.displacement_x[0], result.displacement_z[0]) == tuple(single.displacement)
+    assert result.stepped[0]
+
+
+def test_arguments_are_not_changed() -> None:
+    bodies, states, sides, commands = _random_walkers(50, 7)
+    copies = [bodies.copy(), states.copy(), sides.copy()]
+    step_batch(bodies, states, sides, **commands)
+    assert all((a == b).all() for a, b in zip((bodies, states, sides), copies, strict=True))
+
+
+def test_bodies_come_from_parameters_one_or_many() -> None:
+    assert bodies_of(WalkerParameters()).shape == (1, len(Body._fields))
+    many = bodies_of([WalkerParameters(), WalkerParameters(slope=0.02)])
+    assert (many[:, 3] == [0.01, 0.02]).all()
+    assert len(fields(WalkerParameters)) == len(Body._fields)
+
+
+def test_an_unknown_column_is_refused(gait: Vector) -> None:
+    result = step_batch(WalkerParameters(), [gait], 1.0)
+    with pytest.raises(AttributeError, match="BatchResult has no attribute 'speed'"):
+        _ = result.speed
+    assert isinstance(result, BatchResult)
+
+
+GOOD = np.tile([0.0, 0.155, 0.0, -0.4, 0.0], (3, 1))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"states": GOOD[0]}, r"states must have shape \(n, 5\), not \(5,\)"),
+        ({"states": GOOD[:, :4]}, r"states must have shape \(n, 5\), not \(3, 4\)"),
+        ({"states": GOOD * np.nan}, "states must be finite"),
+        ({"states": GOOD * [0, 11, 0, 0, 0]}, "within a quarter turn"),
+        ({"sides": 0.5}, r"sides must be \+1 \(left\) or -1 \(right\)"),
+        ({"sides": [1.0, -1.0]}, r"sides must be a number or have shape \(3,\), not \(2,\)"),
+        ({"sides": np.nan}, "sides"),
+        ({"inter_leg_angles": -0.1}, r"inter_leg_angles must be in \[0, 1.5708\], not -0.1"),
+        ({"inter_leg_angles": [0.3, 0.3, np.nan]}, "inter_leg_angles must be in .*, not nan"),
+        ({"mass_offsets": [0.0, 2.0, 0.0]}, r"mass_offsets must be in \[-1, 1\], not 2.0"),
+        ({"previous_offsets": -3.0}, "previous_offsets must be in"),
+        ({"parameters": [WalkerParameters()] * 2}, "parameters must be one or 3 walkers', not 2"),
+        ({"parameters": np.zeros((3, 4))}, r"parameters must have shape \(n, 11\), not \(3, 4\)"),
+        ({"threads": 0}, r"threads must be in \[1, 1024\], not 0"),
+    ],
+)
+def test_bad_input_is_refused_by_name(arguments: dict[str, Any], message: str) -> None:
+    good: dict[str, Any] = {"parameters": WalkerParameters(), "states": GOOD, "sides": 1.0}
+    with pytest.raises(ValueError, match=message):
+        step_batch(**(good | arguments))
+
+
+def test_a_solver_s_failure_raises_and_is_no_fall() -> None:
+    # An ankle next to without inertia on a damper a million times stiffer: no explicit integrator gets through
+    body = WalkerParameters(hip_width=0.0, ankle_tilt=1e-3, ankle_damping=50.0)
+    state = [0.0, 0.1, 0.1, -0.4, 0.1]
+    with pytest.raises(SolverError, match=r"walker 0 .* did not converge"):
+        step_batch(body, [state], 1.0)
+    with pytest.raises(SolverError, match="did not converge"):
+        Walker(body).step(state)
+    assert records.FAILED not in (records.STEPPED, records.BACKWARD)
