@@ -68,7 +68,8 @@ class WalkerRows:
             self.bodies, self.memory, self.stream, self.settings, self.actions, self.outcomes,
             self.observations, self.rewards, self.terminated, self.truncated,
         )  # fmt: skip
-        self._scratch = (np.zeros((n, 3)), np.zeros((n, STATE_SIZE)), np.zeros(n))
+        # commands, states and sides as the batch kernel takes them
+        self.kernel_rows = (np.zeros((n, 3)), np.zeros((n, STATE_SIZE)), np.zeros(n))
 
     def start(self, rows: NDArray[np.int64], generators: list[np.random.Generator]) -> None:
         """Begin episodes of these rows, each drawing its stream's key from its own generator."""
@@ -147,7 +148,7 @@ class WalkerRows:
 
     def step_many(self, skip: NDArray[np.bool_], first: int, last: int) -> int:
         """Step rows ``first`` to ``last`` - 1 by ``actions``, but for those to skip; return what ``raise_for`` takes."""
-        return self.task.step_many(*self._step_arguments, *self._scratch, skip, first, last)
+        return self.task.step_many(*self._step_arguments, *self.kernel_rows, skip, first, last)
 
     def raise_for(self, code: int) -> None:
         if code == NOT_A_NUMBER:
