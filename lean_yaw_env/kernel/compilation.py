@@ -9,10 +9,11 @@ Both keep IEEE semantics (no fast-math), so that every kernel that inlines the s
 from __future__ import annotations
 
 import hashlib
+import sys
 import warnings
 from collections.abc import Callable
-from functools import lru_cache
 from pathlib import Path
+from types import FunctionType, ModuleType
 from typing import Any
 
 from numba import njit
@@ -54,26 +55,54 @@ def _borrowed(array):
     return lambda array: _without_owner(array)
 
 
-_KERNEL = Path(__file__).parent
+_PACKAGE = __name__.split(".", 1)[0]
 
 
-@lru_cache
-def _sources_digest(folder: Path) -> str:
-    """A digest of the sources an entry point in that folder is made from: the kernel's, the folder's, and those between it and the package."""
-    between = {parent for parent in folder.parents if _KERNEL.parent in parent.parents}
-    folders = {_KERNEL, folder} | between
-    digest = hashlib.sha256()
-    for path in sorted(path for each in folders for path in each.glob("*.py")):
-        digest.update(path.read_bytes())
+def _ingredients(function: Callable[..., Any]) -> tuple[set[str], set[str]]:
+    """What a function is compiled from: files (its own, and those of the package's formulas and records that it names) and constants."""
+    files: set[str] = {__file__}
+    constants: set[str] = set()
+    waiting: list[Any] = [function]
+    seen: set[Any] = set()
+    while waiting:
+        each = waiting.pop()
+        seen.add(each)
+        files.add(each.__code__.co_filename)
+        for name in each.__code__.co_names:
+            named = each.__globals__.get(name)
+            named = getattr(named, "py_func", named)
+            home = named.__name__ if isinstance(named, ModuleType) else _home(named)
+            if isinstance(named, (bool, int, float, tuple)):
+                constants.add(f"{name} = {named!r}")
+            elif home.split(".", 1)[0] != _PACKAGE:
+                continue
+            elif isinstance(named, FunctionType):
+                waiting.extend({named} - seen)
+            else:
+                files.add(str(sys.modules[home].__file__))
+    return files, constants
+
+
+def _home(named: Any) -> str:
+    """The module that a function or class is from; nothing for what has none."""
+    return getattr(named, "__module__", None) or ""
+
+
+def _digest(function: Callable[..., Any]) -> str:
+    """A digest of what a function's machine code depends on."""
+    files, constants = _ingredients(function)
+    digest = hashlib.sha256("\n".join(sorted(constants)).encode())
+    for path in sorted(files):
+        digest.update(Path(path).read_bytes())
     return digest.hexdigest()
 
 
 def entry_point(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function that Python calls, releasing the GIL, and keep its machine code on disk.
 
-    Numba renews its cache when the entry point's own file changes, but not when a formula inlined from another file does. The digest
-    of all sources that may be inlined takes the place of that file's time stamp, which also serves file systems without stable times.
-    Where no cache folder can be written, the function is compiled in every process and a warning says so once.
+    Numba renews its cache when the entry point's own file changes, but not when a formula inlined from another file does. A digest
+    of all sources that are inlined takes the place of that file's time stamp, which also serves file systems without stable times.
+    What an entry point inlines must be defined above it. Where no cache folder can be written, the function is compiled in every process and a warning says so once.
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
@@ -85,8 +114,7 @@ def entry_point(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         except RuntimeError:
             _warn_uncached()
         else:
-            folder = Path(function.__code__.co_filename).parent
-            dispatcher._cache._cache_file._source_stamp = _sources_digest(folder)
+            dispatcher._cache._cache_file._source_stamp = _digest(function)
         return dispatcher
 
     return decorate
