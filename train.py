@@ -20,7 +20,7 @@ def main(
         str, typer.Option(help="The task's name, as in LeanYaw/<task>-v0.")
     ] = "Heading",
     seed: Annotated[
-        int | None, typer.Option(help="Of all that is drawn. [default: 0]", show_default=False)
+        int | None, typer.Option(help="Of all that is drawn; 0 otherwise.", show_default=False)
     ] = None,
     steps: Annotated[
         int | None,
@@ -32,7 +32,7 @@ def main(
     episodes: Annotated[
         int | None,
         typer.Option(
-            help="Episodes that each agent is judged by. [default: 1000]", show_default=False
+            help="Episodes that each agent is judged by; 1000 otherwise.", show_default=False
         ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Where runs leave their folders.")] = Path("runs"),
@@ -52,7 +52,7 @@ def main(
     threads: Annotated[
         int | None,
         typer.Option(
-            help="Threads of torch and of the walkers; one is best for small networks. [default: 1]",
+            help="Threads of torch and of the walkers; one is best for small networks, and used otherwise.",
             show_default=False,
         ),
     ] = None,

@@ -22,7 +22,7 @@ def main(
     agents: Annotated[
         list[str] | None,
         typer.Option(
-            help="Agents to evaluate, one after the other: random, fixed, feedback, ppo. All by default.",
+            help="Agents to evaluate, one after the other: random, fixed, feedback, ppo. All there are for the task by default.",
             show_default=False,
         ),
     ] = None,

@@ -10,7 +10,7 @@ from agents.agent import Agent
 from agents.controllers import FixedController, RandomController
 from agents.files import read_json
 from agents.heading_feedback import HeadingFeedback
-from agents.storage import CARD_FILE, PolicyFileError, load, task_of
+from agents.storage import CARD_FILE, load, task_of
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.registration import ENV_IDS
 
@@ -69,6 +69,17 @@ def make_agent(name: str, request: AgentRequest) -> Agent:
     return AGENTS[name](request)
 
 
+def make_all(request: AgentRequest) -> dict[str, Agent]:
+    """Every agent that there is for this task; those that need a training which is not found are left out."""
+    agents: dict[str, Agent] = {}
+    for name in AGENTS:
+        try:
+            agents[name] = make_agent(name, request)
+        except ValueError:
+            continue
+    return agents
+
+
 def env_id_of(task: str) -> str:
     """The environment's id for a task's name, or ``ValueError``."""
     for env_id in ENV_IDS:
@@ -89,6 +100,3 @@ def newest_policy(env_id: str, runs: Path) -> Path | None:
         if isinstance(values, dict) and values.get("env_id") == env_id:
             found.append((card.stat().st_mtime, card.parent))
     return max(found)[1] if found else None
-
-
-__all__ = ["AGENTS", "AgentRequest", "PolicyFileError", "env_id_of", "make_agent", "newest_policy"]

@@ -9,7 +9,7 @@ from rich.console import Console
 from tqdm import tqdm
 
 from agents.evaluation import Row, evaluate
-from agents.registry import AGENTS, AgentRequest, env_id_of, make_agent
+from agents.registry import AgentRequest, env_id_of, make_agent, make_all
 from agents.tables import results_table, rows_to_json
 from lean_yaw_env.envs.options import EnvOptions
 
@@ -25,7 +25,7 @@ def evaluate_named(
     options: EnvOptions | None = None,
     progress: bool = True,
 ) -> list[Row]:
-    """Evaluate agents of the registry; all of them if none is named.
+    """Evaluate agents of the registry; all that there are for the task if none is named.
 
     Raises
     ------
@@ -34,13 +34,16 @@ def evaluate_named(
     """
     chosen = EnvOptions() if options is None else options
     request = AgentRequest(env_id_of(task), chosen, seed=seed, path=path, runs=runs)
-    agents = {name: make_agent(name, request) for name in (names or tuple(AGENTS))}
-    with tqdm(
-        total=episodes * len(agents), desc="evaluating", unit="episode", disable=not progress
-    ) as bar:
+    agents = {name: make_agent(name, request) for name in names} or make_all(request)
+    with progress_bar(episodes * len(agents), progress) as bar:
         return evaluate(
             task, agents, episodes=episodes, seed=seed, options=chosen, progress=bar.update
         )
+
+
+def progress_bar(episodes: int, shown: bool) -> tqdm:
+    """The bar of an evaluation."""
+    return tqdm(total=episodes, desc="evaluating", unit="episode", disable=not shown)
 
 
 def show(rows: Sequence[Row], console: Console, *, as_json: bool = False) -> None:

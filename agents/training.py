@@ -10,8 +10,6 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from agents.agent import Agent
 from agents.evaluation import Row, evaluate
 from agents.files import read_json, write_json
@@ -19,7 +17,8 @@ from agents.pictures import save_agents_footprints, save_learning_curve
 from agents.policy import Policy
 from agents.ppo import TrainingLog, train_ppo
 from agents.ppo_settings import PPOSettings, settings_for
-from agents.registry import AGENTS, AgentRequest, env_id_of, make_agent
+from agents.registry import AgentRequest, env_id_of, make_all
+from agents.reporting import progress_bar
 from agents.seeds import MOST_EPISODES, evaluation_seed, training_seed
 from agents.storage import CARD_FILE, options_from_plain, options_to_plain, save, task_of
 from agents.tables import rows_to_plain
@@ -215,25 +214,11 @@ def _is_finished(folder: Path) -> bool:
 def _judged_agents(training: Training, policy: Policy) -> dict[str, Agent]:
     """The trained policy beside the agents that need no training and know the task."""
     request = AgentRequest(training.env_id, training.options, seed=training.seed)
-    agents: dict[str, Agent] = {}
-    for name in AGENTS:
-        if name == "ppo":
-            agents[name] = policy
-            continue
-        try:
-            agents[name] = make_agent(name, request)
-        except ValueError:  # feedback where there is nothing to feed back
-            continue
-    return agents
+    return make_all(request) | {"ppo": policy}
 
 
 def _judge(training: Training, agents: Mapping[str, Agent], progress: bool) -> list[Row]:
-    with tqdm(
-        total=training.episodes * len(agents),
-        desc="evaluating",
-        unit="episode",
-        disable=not progress,
-    ) as bar:
+    with progress_bar(training.episodes * len(agents), progress) as bar:
         return evaluate(
             task_of(training.env_id),
             agents,
