@@ -1,0 +1,224 @@
+"""Gaits of the active walker: the paper's tables and figures, exact fixed points and multipliers, and what has no gait."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from lean_yaw_env import LimitCycle, NoGaitError, Walker, WalkerParameters, find_limit_cycle
+from lean_yaw_env.analysis.limit_cycle import find_gait, planar_gait_rate
+from lean_yaw_env.analysis.stride import stride_jacobian, stride_map
+from lean_yaw_env.errors import FellError
+from lean_yaw_env.parameters import MIRROR, Vector
+from tests.reference import ReferenceWalker
+
+
+@pytest.fixture(scope="module")
+def cycle() -> LimitCycle:
+    return find_limit_cycle(Walker())
+
+
+# --- laws
+
+
+def test_the_gait_repeats_itself_to_round_off(cycle: LimitCycle) -> None:
+    assert cycle.residual <= 1e-12
+    first, second = stride_map(Walker(), cycle.state)
+    assert np.abs(second.state - cycle.state).max() <= 1e-12
+    # and a right step is a left step's mirror image
+    assert np.abs(first.state - cycle.state * MIRROR).max() <= 1e-12
+
+
+def test_the_gait_is_the_reference_s_to_ten_digits(cycle: LimitCycle) -> None:
+    reference = ReferenceWalker()
+
+    def stride(state: Vector) -> Vector:
+        middle = reference.step(state, 1.0, 0.3, 0.0, 0.0)[0]
+        return reference.step(middle, -1.0, 0.3, 0.0, 0.0)[0]
+
+    state = cycle.state.copy()
+    for _ in range(2):
+        state -= np.linalg.solve(cycle.jacobian - np.eye(5), stride(state) - state)
+    # A stride's error of 4e-13 moves a fixed point of multiplier 0.986 seventy times as far
+    assert np.abs(state - cycle.state).max() < 5e-11
+
+
+def test_multipliers_are_those_of_the_exact_jacobian(cycle: LimitCycle) -> None:
+    jacobian = stride_jacobian(Walker(), cycle.state)
+    assert np.abs(jacobian.matrix - cycle.jacobian).max() < 1e-11
+    assert np.abs(jacobian.state - cycle.state).max() < 1e-12
+    own = np.linalg.eigvals(jacobian.matrix)
+    own = own[np.argsort(-np.abs(own))]
+    assert np.abs(np.abs(own) - np.abs(cycle.eigenvalues)).max() < 1e-10
+
+
+def test_disturbances_die_out_as_the_first_multiplier_says(cycle: LimitCycle) -> None:
+    state = cycle.state + 1e-4
+    distances = []
+    for _ in range(120):
+        state = stride_map(Walker(), state)[1].state
+        distances.append(np.abs(state - cycle.state).max())
+    # after sixty strides the second multiplier, 0.959, has all but died out; second-order terms are of 1e-4
+    ratio = (distances[119] / distances[79]) ** (1 / 40)
+    assert ratio == pytest.approx(cycle.eigenvalues[0].real, abs=2e-3)
+    assert cycle.is_stable
+
+
+def test_one_multiplier_is_zero_as_heel_strike_ties_pitch_to_lean(cycle: LimitCycle) -> None:
+    assert abs(cycle.eigenvalues[-1]) < 1e-12
+
+
+def test_energy_gained_along_the_gait_is_the_slope_s(cycle: LimitCycle) -> None:
+    assert cycle.gravity_work == pytest.approx(math.sin(0.01), abs=1e-12)
+    assert cycle.shift_work == 0.0
+    assert cycle.speed * cycle.stride_period == pytest.approx(2.0 * cycle.step_length, rel=1e-14)
+
+
+@pytest.mark.parametrize(("radius", "slope"), [(0.0, 0.01), (0.5, 0.01), (0.5, 0.03), (0.8, 0.005)])
+def test_without_hip_width_the_gait_is_the_planar_closed_form(radius: float, slope: float) -> None:
+    walker = Walker(WalkerParameters(hip_width=0.0, foot_radius=radius, slope=slope))
+    state = find_gait(walker)
+    level, lift = radius + (1 - radius) * math.cos(0.15), (1 - radius) * math.sin(0.15)
+    kept = (level**2 - lift**2) / (level**2 + lift**2)
+    gained = 4.0 * (0.15 * radius + lift) * math.sin(slope) / (level**2 + lift**2)
+    rate = -math.sqrt(gained * kept**2 / (1 - kept**2))
+    # the residual of the search, times how far the softest multiplier lets the rate go
+    assert np.abs(state - [0.0, 0.15, 0.0, rate, 0.0]).max() < 1e-10
+    assert planar_gait_rate(walker, 0.3) == pytest.approx(rate, rel=1e-12)
+
+
+def test_the_two_searches_agree(cycle: LimitCycle) -> None:
+    assert np.abs(find_gait(Walker()) - cycle.state).max() < 1e-10
+
+
+# --- published numbers
+
+
+def test_table_2(cycle: LimitCycle) -> None:
+    # This reading's digits; the paper gives 0.0016 (0.00155 in Figure 14), -0.0041, -0.42, -0.070
+    known = [0.001539, 0.1553577, -0.004109, -0.415110, -0.070156]
+    assert np.abs(cycle.state - known).max() < 6e-7
+    # the paper's fourth coordinate is the leg's pitch, not the foot's: L = Ry(u1) Rx(u2) Rz(u4), 0.155
+    _, leg = ReferenceWalker().pose(*cycle.state[:3], 1.0)
+    assert math.atan2(leg[1, 0], leg[1, 1]) == pytest.approx(0.155354, abs=5e-7)
+
+
+def test_section_4_2_step_length(cycle: LimitCycle) -> None:
+    # "0.3 times the leg length"
+    assert cycle.step_length == pytest.approx(0.3, abs=0.0025)
+
+
+def test_figure_11_slope_at_which_the_walker_without_hip_width_becomes_stable() -> None:
+    def instability(slope: float) -> float:
+        walker = Walker(WalkerParameters(hip_width=0.0, slope=slope))
+        return float(np.abs(find_limit_cycle(walker).eigenvalues).max()) - 1.0
+
+    slope = brentq(instability, 0.009, 0.0109, xtol=1e-7)
+    assert slope == pytest.approx(0.01, abs=2e-4)  # the paper's
+    assert slope == pytest.approx(0.01016, abs=5e-6)
+
+
+@pytest.mark.parametrize(
+    ("tilt", "radius", "speed", "published"),
+    [
+        (math.pi / 8, 0.5, 0.364, 0.36),
+        (math.pi / 8, 0.2, 0.364, 0.36),
+        (math.pi / 4, 0.5, 0.705, 0.72),
+        (math.pi / 4, 0.2, 0.715, 0.72),
+    ],
+)
+def test_figure_13_critical_speed_depends_on_the_tilt_alone(
+    tilt: float, radius: float, speed: float, published: float
+) -> None:
+    def cycle_at(slope: float) -> LimitCycle:
+        parameters = WalkerParameters(
+            hip_width=0.0, foot_radius=radius, ankle_tilt=tilt, slope=slope
+        )
+        return find_limit_cycle(Walker(parameters))
+
+    def instability(log_slope: float) -> float:
+        return float(np.abs(cycle_at(math.exp(log_slope)).eigenvalues).max()) - 1.0
+
+    critical = cycle_at(
+        math.exp(brentq(instability, math.log(0.004), math.log(0.055), xtol=1e-6))
+    ).speed
+    assert critical == pytest.approx(
+        published, abs=0.016
+    )  # read off a plot: 0.72 comes out as 0.705
+    assert critical == pytest.approx(speed, abs=6e-4)
+
+
+@pytest.mark.parametrize("offset", [0.002, 0.006, -0.006])
+def test_figure_15_an_offset_turns_the_gait_to_where_the_slope_balances_it(offset: float) -> None:
+    cycle = find_limit_cycle(Walker(), mass_offset=offset)
+    first, second = stride_map(Walker(), cycle.state, mass_offset=offset)
+    heading = 0.5 * (first.state[0] + second.state[0])
+    closed_form = -math.asin(offset / math.tan(0.01))
+    # the closed form balances the moments at the mean heading: left and right steps differ by little
+    assert heading == pytest.approx(closed_form, abs=4e-3)
+    if offset == 0.006:
+        assert heading == pytest.approx(-0.64, abs=5e-3)  # the paper: to the right
+    # the walk itself goes exactly where the offset over the distance gives as much as the slope takes
+    walked = first.displacement + second.displacement
+    assert cycle.gravity_work == pytest.approx(
+        math.sin(0.01) * walked[0] / np.linalg.norm(walked), abs=1e-12
+    )
+
+
+def test_a_pumping_walker_walks_on_the_level_and_uphill() -> None:
+    for slope, speed in ((0.0, 0.632), (-0.005, 0.561)):
+        walker = Walker(WalkerParameters(slope=slope))
+        cycle = find_limit_cycle(walker, mass_offset=(0.03, -0.03))
+        assert cycle.speed == pytest.approx(speed, abs=6e-4)
+        assert cycle.normal_force > 0.34
+        assert cycle.friction_demand < 0.5
+        # what pumping puts in is what the slope takes and the impacts lose
+        assert cycle.shift_work > -cycle.gravity_work
+        assert cycle.gravity_work == pytest.approx(math.sin(slope), abs=1e-10)
+
+
+# --- bad input
+
+
+@pytest.mark.parametrize(
+    ("parameters", "command", "message"),
+    [
+        ({"slope": 0.0}, {}, "no closed form"),
+        ({"slope": -0.02}, {}, "no closed form"),
+        ({}, {"mass_offset": 0.2}, "no closed form|following"),
+    ],
+)
+def test_a_walker_without_a_gait_is_told_what_was_tried(
+    parameters: dict[str, float], command: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(NoGaitError, match=message):
+        find_limit_cycle(Walker(replace(WalkerParameters(), **parameters)), **command)
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        ({"inter_leg_angle": 0.0}, "inter_leg_angle must be in"),
+        ({"inter_leg_angle": math.nan}, "inter_leg_angle must be in"),
+        ({"mass_offset": 1.5}, "offset must be in"),
+    ],
+)
+def test_a_bad_command_is_refused(command: dict[str, float], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        find_limit_cycle(Walker(), **command)
+
+
+def test_a_stride_that_falls_says_which_step_and_how(gait: Vector) -> None:
+    with pytest.raises(FellError, match="fell backward in the stride's first step"):
+        stride_map(Walker(), [0.0, 0.155, 0.0, 0.15, 0.0])
+    with pytest.raises(FellError, match=r"fell .* in the step on its left foot"):
+        stride_jacobian(Walker(), [0.0, 0.155, 0.0, 0.15, 0.0])
+    state = gait * [1.0, 1.0, 1.0, 0.3, 1.0]
+    assert Walker().step(state).fall is None
+    with pytest.raises(FellError, match="fell backward in the stride's second step"):
+        stride_map(Walker(), state)
