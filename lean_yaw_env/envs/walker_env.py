@@ -32,7 +32,7 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
     | number | what it sets for this step | default range |
     |---|---|---|
     | 0 | inter-leg angle: 0.3 + 0.15 a0 rad | 0.15 to 0.45 |
-    | 1 | mass offset 0.05 a1, within 0.005 of the offset in force, positive away from the stance foot's side if mirrored | +-0.05 |
+    | 1 | mass offset 0.05 a1, within 0.005 (or the task's largest change) of the offset in force, positive away from the stance foot's side if mirrored | +-0.05 |
 
     ## Observation space
     ``Box(-10, 10, float32)``: (value - centre) / scale, clipped to the box. Mirrored to a left stance by default.
@@ -98,8 +98,8 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin an episode: either foot, the gait and a random deviation.
 
-        ``options`` may hold ``state`` (a section state), ``stance`` ("left" or "right") and, for a task with one, ``command`` (a heading in
-        rad), in place of what would be drawn.
+        ``options`` may hold ``state`` (a section state), ``stance`` ("left" or "right") and the commands that the task takes
+        (``Task.commands``), in place of what would be drawn.
         """
         self.rows.check_options(options or {})
         super().reset(seed=seed)
