@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -156,6 +156,8 @@ def _make_model(
     tensorboard: Path | None,
 ) -> PPO:
     first = training_seed(seed)
+    if settings.push_level is not None:
+        options = replace(options, push_level=settings.push_level)
     walkers = WalkerVecEnv(settings.walkers, task_of(env_id), threads=threads, **vars(options))
     env = VecNormalize(
         walkers,

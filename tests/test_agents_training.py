@@ -115,6 +115,18 @@ def test_seeds_decide_a_training_and_different_ones_differ():
     assert not np.array_equal(one["layers.0.weight"], other["layers.0.weight"])
 
 
+def test_pushes_of_the_training_are_no_part_of_what_the_policy_is_for():
+    small = PPOSettings(steps=256, walkers=8, steps_per_update=32, batch_size=128, epochs=1)
+    pushed = PPOSettings(**vars(small) | {"push_level": 0.5})
+    calm, shaken = (train_ppo(ID, s, options=SHORT, progress=False).policy for s in (small, pushed))
+    assert shaken.card.options == calm.card.options == SHORT
+    assert shaken.card.settings["push_level"] == 0.5
+    # pushes are seen, so that the statistics of observations differ
+    assert not np.array_equal(
+        calm.weights["observation_variance"], shaken.weights["observation_variance"]
+    )
+
+
 def test_training_leaves_torch_s_threads_as_they_were():
     before = torch.get_num_threads()
     small = PPOSettings(steps=64, walkers=4, steps_per_update=16, batch_size=64, epochs=1)
@@ -204,7 +216,7 @@ def test_a_damaged_run_is_refused(tmp_path):
 
 
 def test_the_command_line_trains_judges_and_is_found_by_the_evaluator(tmp_path):
-    arguments = ["--task", "Walk", "--steps", "8192", "--episodes", "2", "--out", str(tmp_path)]
+    arguments = ["--task", "Walk", "--steps", "16384", "--episodes", "2", "--out", str(tmp_path)]
     result = CliRunner().invoke(train.app, arguments, env={"COLUMNS": "200"})
     assert result.exit_code == 0, result.output
     assert "ppo" in result.output
@@ -254,8 +266,9 @@ def test_every_environment_has_settings_and_bad_ones_are_refused():
     with pytest.raises(ValueError, match="env_id must be one of"):
         settings_for("CartPole-v1")
     for values, message in [
-        ({"batch_size": 1000}, "batch_size must divide the 8192 samples"),
+        ({"batch_size": 1000}, "batch_size must divide the 16384 samples"),
         ({"walkers": 0}, "walkers must be in"),
+        ({"push_level": -1.0}, "push_level must be in"),
         ({"time_constant": 0.0}, "time_constant must be in"),
         ({"gae_lambda": 1.5}, "gae_lambda must be in"),
         ({"hidden": ()}, "hidden must name one layer"),
