@@ -9,7 +9,7 @@ import numpy as np
 from lean_yaw_env.analysis import continue_gait
 from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import compare, judge
-from lean_yaw_env.paper.drawing import new_figure
+from lean_yaw_env.paper.drawing import new_figure, picture_of
 from lean_yaw_env.paper.multiplier_curves import (
     MultiplierCurves,
     along_slope,
@@ -41,9 +41,7 @@ def active_multipliers(points: int = 401) -> tuple[MultiplierCurves, MultiplierC
 def draw_active_multipliers(left: MultiplierCurves, right: MultiplierCurves) -> Any:
     """Figure 10, both graphs."""
     figure = new_figure(10.0, 4.4)
-    for axes, curves, slope in zip(
-        figure.subplots(1, 2), (left, right), _SLOPES_10, strict=True
-    ):
+    for axes, curves, slope in zip(figure.subplots(1, 2), (left, right), _SLOPES_10, strict=True):
         draw_curves(axes, curves, x=TILT, top=_TOP, title=f"γ = {slope:g}")
     return figure
 
@@ -76,7 +74,7 @@ def figure_10() -> Result:
             ),
         ),
         tables={"figure10_left": left.columns(), "figure10_right": right.columns()},
-        picture=draw_active_multipliers(left, right),
+        picture=picture_of(draw_active_multipliers(left, right)),
         caption=(
             "|λ| of the active flat walker (d = 0, r = 0.5) at slope 0.00058 (left) and 0.01 "
             "(right): three-dimensional modes solid, fore-aft modes dashed, the stable region "
@@ -114,7 +112,7 @@ def figure_11() -> Result:
     return Result(
         checks=(compare(numbers.STABLE_SLOPE, stable_slope()),),
         tables={"figure11": curves.columns()},
-        picture=draw_slope_multipliers(curves),
+        picture=picture_of(draw_slope_multipliers(curves)),
         caption=(
             "|λ| of the active flat walker (d = 0, r = 0.5, α = 0.55) against the slope: "
             "three-dimensional modes solid, fore-aft modes dashed, the stable region shaded. The "

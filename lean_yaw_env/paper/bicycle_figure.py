@@ -9,7 +9,7 @@ import numpy as np
 
 from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import Check, compare, judge
-from lean_yaw_env.paper.drawing import FAINT, STABLE_FACE, name_axes, new_figure
+from lean_yaw_env.paper.drawing import FAINT, STABLE_FACE, name_axes, new_figure, picture_of
 from lean_yaw_env.paper.results import Columns, Result
 from lean_yaw_env.vehicles import (
     BRANCH_NAMES,
@@ -157,7 +157,7 @@ def figure_4() -> Result:
     return Result(
         checks=bicycle_checks(data),
         tables={"figure4": data.columns()},
-        picture=draw_bicycle_eigenvalues(data),
+        picture=picture_of(draw_bicycle_eigenvalues(data)),
         caption=(
             "Eigenvalues of the paper's bicycle, eq. (5): real parts solid, imaginary part dashed. "
             "Shaded: the stable range of speeds. The dot is where two real eigenvalues meet."

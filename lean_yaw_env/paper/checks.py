@@ -134,7 +134,7 @@ def judge(
 
 def significant(ours: float, number: PaperNumber) -> str:
     """Ours with two digits more than are printed; a zero but for round-off as such."""
-    decimals = number.decimals + 2
     if abs(ours) < _ROUND_OFF:
         return "0"
-    return f"{ours:.{decimals}f}"
+    text = f"{ours:.{number.decimals + 2}f}"
+    return text if float(text) != 0.0 else f"{ours:.1e}"

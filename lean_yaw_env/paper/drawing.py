@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lean_yaw_env.rendering.picture import new_figure
@@ -15,6 +18,7 @@ LIGHT_GREY, DARK_GREY = "#d9d9d9", "#a6a6a6"
 """The two stability regions of Figure 13."""
 FAINT = "#7c7d80"
 MULTIPLIER = "|λ|"
+_DPI = 130
 
 __all__ = [
     "DARK_GREY",
@@ -25,6 +29,7 @@ __all__ = [
     "mark_unit_circle",
     "name_axes",
     "new_figure",
+    "picture_of",
     "shade_intervals",
 ]
 
@@ -56,3 +61,8 @@ def shade_intervals(axes: Axes, x: Any, inside: Any, *, label: str) -> None:
         label=label,
         zorder=0,
     )
+
+
+def picture_of(figure: Any) -> Callable[[Path], None]:
+    """What draws a matplotlib figure into a file."""
+    return partial(figure.savefig, dpi=_DPI)

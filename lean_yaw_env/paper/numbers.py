@@ -24,6 +24,8 @@ class PaperNumber:
     meaning : str
     about : float
         Relative room where the paper says "about", "almost" or reads a sketch; 0 where it does not.
+    is_rounded : bool
+        Whether the printed digits are a rounded result, which ours must round to.
     """
 
     name: str
@@ -31,6 +33,7 @@ class PaperNumber:
     where: str
     meaning: str
     about: float = 0.0
+    is_rounded: bool = True
 
     @property
     def value(self) -> float:
@@ -43,8 +46,8 @@ class PaperNumber:
 
     @property
     def half_digit(self) -> float:
-        """Half a unit of the last printed place: what rounding may hide."""
-        return 0.5 * 10.0**-self.decimals
+        """Half a unit of the last printed place: what rounding may hide; 0 if nothing was rounded."""
+        return 0.0 if not self.is_rounded else 0.5 * 10.0**-self.decimals
 
 
 @dataclass(frozen=True)
@@ -118,6 +121,25 @@ BICYCLE_FREQUENCY = Statement(
 )
 BICYCLE_HIGH_SPEED = Statement(
     "high speed", "approaches zero", "section 2.2", "capsize eigenvalue with further speed"
+)
+
+SKATEBOARD_SPEED = Statement(
+    "eq. (3)",
+    "v_min = sqrt((m g h - 2 k) w tan α / (2 m h))",
+    "section 2.1",
+    "speed at which the skateboard's eigenvalue passes zero",
+)
+SKATEBOARD_STIFF = Statement(
+    "stiff springs", "never unstable", "section 2.1", "skateboard with 2 k > m g h"
+)
+SKATEBOARD_TILT = Statement(
+    "tilt", "the larger α, the higher the required velocity", "section 2.1", "critical velocity"
+)
+SKATEBOARD_MARGINAL = Statement(
+    "undamped", "at best only marginally stable", "section 2.1", "eigenvalues above v_min"
+)
+SKATEBOARD_DAMPED = Statement(
+    "damping", "could make it asymptotically stable", "section 2.1", "damping in the steering axis"
 )
 
 POINT_FOOT_PITCH = PaperNumber(
@@ -198,10 +220,18 @@ WIDER_HELPS = Statement(
 )
 
 CRITICAL_SPEED_PI_8 = PaperNumber(
-    "critical speed, π/8", "0.36", "section 4.3, Figure 13", "speed on the boundary for α = π/8", 0.03
+    "critical speed, π/8",
+    "0.36",
+    "section 4.3, Figure 13",
+    "speed on the boundary for α = π/8",
+    0.03,
 )
 CRITICAL_SPEED_PI_4 = PaperNumber(
-    "critical speed, π/4", "0.72", "section 4.3, Figure 13", "speed on the boundary for α = π/4", 0.03
+    "critical speed, π/4",
+    "0.72",
+    "section 4.3, Figure 13",
+    "speed on the boundary for α = π/4",
+    0.03,
 )
 ONE_SPEED = Statement(
     "boundary is a velocity contour",
@@ -215,8 +245,16 @@ EQUATION_8 = Statement(
     "section 4.3",
     "v ≈ sqrt(γ / θ) / (1 - r) against the gait's speed, r from 0 to 0.7",
 )
-SPEED_IS_TILT = PaperNumber(
-    "v_min over α", "1", "section 4.3", "critical speed over ankle tilt, four data points", 0.1
+SPEED_IS_TILT = tuple(
+    PaperNumber(
+        f"v_min over α, {name}",
+        "1",
+        "section 4.3",
+        "critical speed over ankle tilt, one of four data points",
+        about=0.1,
+        is_rounded=False,
+    )
+    for name in ("Figure 10 left", "Figure 10 right", "Figure 13, π/8", "Figure 13, π/4")
 )
 TILT_INDEPENDENT = Statement(
     "velocity and tilt", "independent of α", "Figure 13", "speed of the flat active walker"
@@ -230,7 +268,10 @@ FOOTPRINT_ANGLE = PaperNumber(
     "footprint angle", "0.00155", "Figure 14", "footprint direction φ, rad"
 )
 OFFSET_HEADING = PaperNumber(
-    "heading under an offset", "0.64", "section 4.4, Figure 15", "heading to the right for μ = 0.006"
+    "heading under an offset",
+    "0.64",
+    "section 4.4, Figure 15",
+    "heading to the right for μ = 0.006",
 )
 TURNING_RADIUS = PaperNumber(
     "turning radius", "8", "section 4.4, Figure 15", "radius for μ = 0.05, leg lengths"
@@ -262,6 +303,7 @@ DISTURBANCE_RATE = PaperNumber(
     "section 4.4",
     "lowest change of the stance leg's rate that it recovers from, %",
     about=0.1,
+    is_rounded=False,
 )
 FALLS_BACKWARD = Statement(
     "beyond -50 %", "falls backward", "section 4.4", "stance leg's rate lowered further"

@@ -9,9 +9,9 @@ import numpy as np
 
 from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import Check, compare, judge
-from lean_yaw_env.paper.drawing import FAINT, name_axes, new_figure
+from lean_yaw_env.paper.drawing import FAINT, name_axes, new_figure, picture_of
 from lean_yaw_env.paper.multiplier_curves import MultiplierCurves, along_tilt, draw_curves
-from lean_yaw_env.paper.results import Columns, Result
+from lean_yaw_env.paper.results import Result
 from lean_yaw_env.paper.walkers import (
     FlatGait,
     arc_foot_walker,
@@ -86,7 +86,7 @@ def figure_7() -> Result:
                 "swing_leg": np.concatenate([points.swing, arcs.swing]),
             }
         },
-        picture=draw_leg_angles(points, arcs),
+        picture=picture_of(draw_leg_angles(points, arcs)),
         caption=(
             "Leg angles over one step of the passive gaits: point feet at slope 0.004 solid, arc "
             "feet (radius 0.5) at slope 0.00058 dashed. The swing leg's passing of the floor near "
@@ -137,7 +137,7 @@ def figure_8() -> Result:
     return Result(
         checks=(_inside(numbers.STABLE_TILT_PASSIVE, low, high),),
         tables={"figure8": curves.columns()},
-        picture=draw_passive_multipliers(curves),
+        picture=picture_of(draw_passive_multipliers(curves)),
         caption=(
             "|λ| of the passive flat walker (d = 0, r = 0.5, γ = 0.00058): three-dimensional modes "
             "solid, fore-aft modes dashed, the stable region shaded. The ranges of the axes are "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from lean_yaw_env.paper.checks import Check
@@ -21,14 +22,15 @@ class Result:
     checks : tuple of Check
     tables : mapping of file stems to columns
         Written as one CSV file each.
-    picture : matplotlib.figure.Figure or None
+    picture : function or None
+        Draws the picture into a PNG file of the given path.
     caption : str
         What the picture shows and what in it is our choice.
     """
 
     checks: tuple[Check, ...] = ()
     tables: Mapping[str, Columns] = field(default_factory=dict)
-    picture: Any = None
+    picture: Callable[[Path], None] | None = None
     caption: str = ""
 
 

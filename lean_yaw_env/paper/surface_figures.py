@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from lean_yaw_env.analysis import continue_gait, stability_map
 from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import compare, judge
-from lean_yaw_env.paper.drawing import MULTIPLIER, STABLE_FACE, name_axes, new_figure
+from lean_yaw_env.paper.drawing import MULTIPLIER, STABLE_FACE, name_axes, new_figure, picture_of
 from lean_yaw_env.paper.results import Columns, Result
 from lean_yaw_env.paper.walkers import flat_active_walker, table_1_gait
 from lean_yaw_env.paper.wide_hips import (
@@ -178,7 +179,7 @@ def figure_9() -> Result:
                 "greatest": [row.stable_tilts[1] for row in rows],
             },
         },
-        picture=draw_passive_surface(data, rows),
+        picture=picture_of(draw_passive_surface(data, rows)),
         caption=(
             "Greatest |λ| of the passive walker (r = 0.5, γ = 0.00058) over ankle tilt and hip "
             "width, cut at 1.5; the line at d = 0 is the upper envelope of Figure 8. Green is "
@@ -192,8 +193,11 @@ def figure_12() -> Result:
     data = active_surface()
     gait = table_1_gait()
     ends = [stable_tilt_ends(width) for width in _COMPARED_WIDTHS]
-    helps = all(a[0] > b[0] and a[1] <= b[1] for a, b in zip(ends[:-1], ends[1:], strict=True))
-    texts = [f"{low:.3f} to {high:.3f} at d = {d:g}" for d, (low, high) in zip(_COMPARED_WIDTHS, ends, strict=True)]
+    helps = all(a[0] > b[0] and a[1] <= b[1] for a, b in itertools.pairwise(ends))
+    texts = [
+        f"{low:.3f} to {high:.3f} at d = {d:g}"
+        for d, (low, high) in zip(_COMPARED_WIDTHS, ends, strict=True)
+    ]
     return Result(
         checks=(
             judge(
@@ -205,7 +209,9 @@ def figure_12() -> Result:
             judge(
                 numbers.WIDER_HELPS,
                 helps,
-                ours="stable α: " + "; ".join(texts) + f" ({np.pi / 2:.3f} is the greatest there is)",
+                ours="stable α: "
+                + "; ".join(texts)
+                + f" ({np.pi / 2:.3f} is the greatest there is)",
                 remark="The return to the course is a little slower with wider hips; no gait was "
                 "found wider than about 0.4."
                 if helps
@@ -213,7 +219,7 @@ def figure_12() -> Result:
             ),
         ),
         tables={"figure12": data.columns()},
-        picture=draw_active_surface(data),
+        picture=picture_of(draw_active_surface(data)),
         caption=(
             "Greatest |λ| of the active walker (r = 0.5, γ = 0.01) over ankle tilt and hip width, "
             "cut at 1.5; the line at d = 0 is the upper envelope of Figure 10 (right), the "

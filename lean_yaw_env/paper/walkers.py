@@ -27,9 +27,7 @@ LATERAL = [0, 2, 4]
 
 def point_foot_walker(slope: float = POINT_FOOT_SLOPE) -> PassiveWalker:
     """Figure 6 A."""
-    return PassiveWalker(
-        WalkerParameters(hip_width=0.0, foot_radius=0.0, slope=slope), planar=True
-    )
+    return PassiveWalker(WalkerParameters(hip_width=0.0, foot_radius=0.0, slope=slope), planar=True)
 
 
 def arc_foot_walker(slope: float = PASSIVE_SLOPE) -> PassiveWalker:
@@ -41,9 +39,7 @@ def flat_passive_walker(
     slope: float = PASSIVE_SLOPE, ankle_tilt: float = FLAT_TILT, hip_width: float = 0.0
 ) -> PassiveWalker:
     """Figure 6 C, passive; with a hip width, D."""
-    return PassiveWalker(
-        WalkerParameters(hip_width=hip_width, ankle_tilt=ankle_tilt, slope=slope)
-    )
+    return PassiveWalker(WalkerParameters(hip_width=hip_width, ankle_tilt=ankle_tilt, slope=slope))
 
 
 def flat_active_walker(
@@ -51,9 +47,7 @@ def flat_active_walker(
 ) -> Walker:
     """Figure 6 C with the swing leg held in front."""
     return Walker(
-        WalkerParameters(
-            hip_width=0.0, foot_radius=foot_radius, ankle_tilt=ankle_tilt, slope=slope
-        )
+        WalkerParameters(hip_width=0.0, foot_radius=foot_radius, ankle_tilt=ankle_tilt, slope=slope)
     )
 
 

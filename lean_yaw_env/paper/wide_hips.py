@@ -5,6 +5,7 @@ At small widths the gait folds back in the tilt, so the branch is entered from b
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -113,7 +114,7 @@ def _row(width: float) -> WideHipRow:
         tilts, radii = _dense(branch)
         folds = np.flatnonzero(np.diff(np.sign(np.diff(tilts))) != 0) + 1
         bounds = [0, *folds.tolist(), tilts.size - 1]
-        for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+        for first, last in itertools.pairwise(bounds):
             order = np.argsort(tilts[first : last + 1]) + first
             pieces.append((tilts[order], radii[order]))
     return WideHipRow(width, tuple(pieces))

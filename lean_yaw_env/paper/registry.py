@@ -1,0 +1,71 @@
+"""Every piece of the paper that can be reproduced, in the paper's order."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from lean_yaw_env.paper.active_claims import active_claims, skateboard_claims, steering_claims
+from lean_yaw_env.paper.active_figures import figure_10, figure_11
+from lean_yaw_env.paper.bicycle_figure import figure_4
+from lean_yaw_env.paper.passive_claims import passive_claims
+from lean_yaw_env.paper.passive_figures import figure_7, figure_8
+from lean_yaw_env.paper.results import Piece, Result
+from lean_yaw_env.paper.surface_figures import figure_9, figure_12
+from lean_yaw_env.paper.tables import table_1, table_2, table_3
+from lean_yaw_env.paper.velocity_figure import figure_13
+from lean_yaw_env.paper.walking_figures import figure_14, figure_15
+from lean_yaw_env.parameters import WalkerParameters
+from lean_yaw_env.rendering import draw_walker
+
+ALL = "all"
+
+
+def walker_drawing() -> Result:
+    """The walker with its parameters; Figures 1 to 3, 5 and 6 are geometry."""
+    return Result(
+        picture=partial(draw_walker, WalkerParameters()),
+        caption="The walker and its parameters, in place of Figures 5 and 6.",
+    )
+
+
+PIECES: tuple[Piece, ...] = (
+    Piece("skateboard", "Skateboard, eqs. (1) to (3)", skateboard_claims),
+    Piece("figure4", "Figure 4: the bicycle's eigenvalues", figure_4),
+    Piece("walker", "The walker (Figures 5 and 6)", walker_drawing),
+    Piece("table1", "Table 1: default parameters", table_1),
+    Piece("table2", "Table 2: the fixed point of the walking motion", table_2),
+    Piece("table3", "Table 3: multipliers of models A, B, C", table_3),
+    Piece("figure7", "Figure 7: leg angles of the passive walkers", figure_7),
+    Piece("claims-passive", "Claims about the passive walkers (section 4.1)", passive_claims),
+    Piece("figure8", "Figure 8: passive flat walker against ankle tilt", figure_8),
+    Piece("figure9", "Figure 9: passive walker against ankle tilt and hip width", figure_9),
+    Piece("figure10", "Figure 10: active flat walker against ankle tilt", figure_10),
+    Piece("figure11", "Figure 11: active flat walker against slope", figure_11),
+    Piece("figure12", "Figure 12: active walker against ankle tilt and hip width", figure_12),
+    Piece("figure13", "Figure 13: velocity and stability", figure_13),
+    Piece(
+        "claims-active", "The critical speed is about the ankle tilt (section 4.3)", active_claims
+    ),
+    Piece("figure14", "Figure 14: steady walk", figure_14),
+    Piece("figure15", "Figure 15: steering", figure_15),
+    Piece("claims-steering", "Circles and disturbances (section 4.4)", steering_claims),
+)
+NAMES = tuple(piece.name for piece in PIECES)
+
+
+def pieces_named(names: tuple[str, ...] | list[str]) -> tuple[Piece, ...]:
+    """Pieces by their names, in the paper's order, each once; ``all`` names every one.
+
+    Raises
+    ------
+    ValueError
+        If there is no piece of a name, or no name.
+    """
+    if not names:
+        raise ValueError(f"name at least one of {ALL}, {', '.join(NAMES)}")
+    for name in names:
+        if name != ALL and name not in NAMES:
+            raise ValueError(
+                f"nothing is called {name!r}: name {ALL} or some of {', '.join(NAMES)}"
+            )
+    return tuple(piece for piece in PIECES if ALL in names or piece.name in names)

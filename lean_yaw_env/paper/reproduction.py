@@ -1,0 +1,146 @@
+"""Reproduce pieces of the paper into a folder: pictures, numbers and a report."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from lean_yaw_env.errors import LeanYawError
+from lean_yaw_env.paper.checks import VERDICTS, Check
+from lean_yaw_env.paper.registry import pieces_named
+from lean_yaw_env.paper.results import Columns, Piece, Result
+from lean_yaw_env.rendering.files import written_whole
+
+CHECK_COLUMNS = (
+    "piece",
+    "name",
+    "where",
+    "statement",
+    "paper",
+    "ours",
+    "difference",
+    "verdict",
+    "remark",
+)
+
+
+@dataclass(frozen=True)
+class Reproduced:
+    """A piece with what came of it.
+
+    Attributes
+    ----------
+    piece : Piece
+    result : Result
+    picture : Path or None
+        The PNG file.
+    """
+
+    piece: Piece
+    result: Result
+    picture: Path | None
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """All pieces asked for.
+
+    Attributes
+    ----------
+    pieces : tuple of Reproduced
+        In the paper's order.
+    """
+
+    pieces: tuple[Reproduced, ...]
+
+    @property
+    def checks(self) -> tuple[Check, ...]:
+        return tuple(check for each in self.pieces for check in each.result.checks)
+
+    def counts(self) -> dict[str, int]:
+        """How many checks came to each verdict."""
+        return {v: sum(check.verdict == v for check in self.checks) for v in VERDICTS}
+
+    def rows(self) -> list[dict[str, str | float | None]]:
+        """One dictionary for each check, by ``CHECK_COLUMNS``."""
+        return [
+            {
+                "piece": each.piece.name,
+                **{name: getattr(check, name) for name in CHECK_COLUMNS[1:]},
+            }
+            for each in self.pieces
+            for check in each.result.checks
+        ]
+
+
+def reproduce(
+    names: Sequence[str],
+    folder: Path,
+    *,
+    before_each: Callable[[Piece], None] = lambda piece: None,
+) -> Reproduction:
+    """Compute pieces of the paper and write their pictures (PNG) and numbers (CSV).
+
+    Each file is written whole or not at all as soon as it is known, so that an interruption costs
+    only the piece in work.
+
+    Parameters
+    ----------
+    names : names of pieces, or "all"
+    folder : Path
+        Created if it does not exist.
+    before_each : function of the piece about to be computed
+        For a progress bar.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown, or the folder is a file.
+    LeanYawError
+        If a piece cannot be computed; names it.
+    """
+    pieces = pieces_named(list(names))
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"the output folder {str(folder)!r} is a file")
+    folder.mkdir(parents=True, exist_ok=True)
+    done = []
+    for piece in pieces:
+        before_each(piece)
+        try:
+            result = piece.make()
+        except LeanYawError as error:
+            raise LeanYawError(f"{piece.name}: {error}") from error
+        for stem, columns in result.tables.items():
+            write_columns(folder / f"{stem}.csv", columns)
+        picture = None
+        if result.picture is not None:
+            picture = folder / f"{piece.name}.png"
+            with written_whole(picture) as temporary:
+                result.picture(temporary)
+        done.append(Reproduced(piece, result, picture))
+    return Reproduction(tuple(done))
+
+
+def write_columns(path: Path, columns: Columns) -> None:
+    """Write equally long columns as CSV, whole or not at all.
+
+    Raises
+    ------
+    ValueError
+        If the columns have different lengths.
+    """
+    with (
+        written_whole(path) as temporary,
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, whole or not at all."""
+    with written_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

@@ -1,0 +1,159 @@
+"""Tables 1 to 3."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from lean_yaw_env.analysis import find_limit_cycle, modes
+from lean_yaw_env.paper import numbers
+from lean_yaw_env.paper.checks import Check, compare
+from lean_yaw_env.paper.numbers import PaperNumber
+from lean_yaw_env.paper.results import Columns, Result
+from lean_yaw_env.paper.walkers import (
+    LATERAL,
+    arc_foot_walker,
+    flat_passive_walker,
+    passive_gait,
+    point_foot_walker,
+    table_1_gait,
+)
+from lean_yaw_env.parameters import Vector, WalkerParameters
+from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.rendering.geometry import Pose, walker_shape
+
+
+def _columns(checks: Sequence[Check]) -> Columns:
+    return {
+        "quantity": [check.name for check in checks],
+        "paper": [check.paper for check in checks],
+        "ours": [check.ours for check in checks],
+    }
+
+
+def table_1() -> Result:
+    """Table 1: the package's defaults are the paper's."""
+    defaults = WalkerParameters()
+    checks = tuple(
+        compare(number, getattr(defaults, name)) for name, number in numbers.TABLE_1.items()
+    )
+    return Result(checks, {"table1": _columns(checks)})
+
+
+def leg_pitch(state: Vector, parameters: WalkerParameters) -> float:
+    """The paper's stance leg angle u4 of a section state on the left foot.
+
+    Its leg frame is turned by yaw, then lean, then u4 about the axle; here that third turn is read
+    from the leg's own direction and the axle's.
+    """
+    leg = walker_shape(parameters, Pose(state, "left", 0.3)).stance_leg
+    up = (leg.hip - leg.ankle) / np.linalg.norm(leg.hip - leg.ankle)
+    axle = _axle(state, parameters)
+    # Yaw and lean bring the vertical to the direction square to the axle that has no forward part
+    flat = np.array([0.0, 1.0, 0.0]) - axle[1] * axle
+    flat /= np.linalg.norm(flat)
+    return float(math.atan2(np.cross(flat, up) @ axle, flat @ up))
+
+
+def _axle(state: Vector, parameters: WalkerParameters) -> Vector:
+    shape = walker_shape(parameters, Pose(state, "left", 0.3))
+    along = shape.swing_leg.hip - shape.stance_leg.hip
+    return along / np.linalg.norm(along)
+
+
+def _leg_pitch_rate(state: Vector, parameters: WalkerParameters) -> float:
+    """Its rate at the section state's rates: geometry only, so a central difference is exact enough."""
+    width = 1e-6
+    motion = np.array([0.0, state[3], state[4], 0.0, 0.0])
+    ahead, behind = (leg_pitch(state + sign * width * motion, parameters) for sign in (1.0, -1.0))
+    return (ahead - behind) / (2.0 * width)
+
+
+def table_2() -> Result:
+    """Table 2: the fixed point of Table 1's walker."""
+    state, parameters = table_1_gait().state, WalkerParameters()
+    rate = _leg_pitch_rate(state, parameters)
+    paper = numbers.TABLE_2
+    checks = (
+        compare(
+            paper["heading"],
+            float(state[0]),
+            unless="Figure 14 has 0.00155, which we miss by 1 %; this table's 0.0016 is that "
+            "rounded up. Feet of finite mass are not the reason: they make it smaller still.",
+            is_open=True,
+        ),
+        compare(paper["leg_pitch"], leg_pitch(state, parameters)),
+        compare(paper["ankle_angle"], float(state[2])),
+        compare(paper["leg_pitch_rate"], rate),
+        compare(paper["ankle_rate"], float(state[4])),
+        compare(paper["swing_rate"], rate, remark="The held swing leg turns with the stance leg."),
+    )
+    return Result(checks, {"table2": _columns(checks)})
+
+
+def table_3() -> Result:
+    """Table 3: multipliers of models A, B and C."""
+    first = _fore_aft(point_foot_walker())
+    paper = numbers.TABLE_3_A
+    checks = [
+        compare(paper["real"], float(first[0].real)),
+        compare(paper["imaginary"], float(first[0].imag)),
+        compare(paper["third"], float(abs(first[2]))),
+    ]
+    checks += _compare_all(numbers.TABLE_3_B, _fore_aft(arc_foot_walker()))
+    gait = passive_gait(flat_passive_walker())
+    matrix = gait.jacobian
+    fore_aft = [i for i in range(matrix.shape[0]) if i not in LATERAL]
+    checks += _compare_all(numbers.TABLE_3_C[:3], _eigenvalues(matrix, fore_aft))
+    checks += _compare_all(numbers.TABLE_3_C[3:], _eigenvalues(matrix, LATERAL), _pair_remark())
+    return Result(tuple(checks), {"table3": _columns(checks), "table3_modes": _mode_columns()})
+
+
+def _fore_aft(walker: PassiveWalker) -> np.ndarray:
+    values = passive_gait(walker).eigenvalues
+    return values[np.lexsort((-values.imag, -np.abs(values)))]
+
+
+def _eigenvalues(matrix: Vector, index: list[int]) -> np.ndarray:
+    values = np.linalg.eigvals(matrix[np.ix_(index, index)])
+    return values[np.argsort(-np.abs(values))]
+
+
+def _compare_all(paper: Sequence[PaperNumber], ours: np.ndarray, unless: str = "") -> list[Check]:
+    return [
+        compare(number, float(value.real), unless=unless, is_open=bool(unless))
+        for number, value in zip(paper, ours, strict=True)
+    ]
+
+
+def _pair_remark() -> str:
+    """How sharply the pair depends on the tilt, which no common tilt reconciles with the paper."""
+    near = passive_gait(flat_passive_walker(ankle_tilt=0.1499)).jacobian
+    pair = np.sort(np.abs(_eigenvalues(near, LATERAL)))[::-1]
+    return (
+        "The pair is very sensitive there: at α = 0.1499 it is "
+        f"{pair[0]:.3f} and {pair[1]:.3f}. Neither another tilt nor any foot mass gives both of "
+        "the paper's values at once (see the nine-coordinate model), so this stays open."
+    )
+
+
+def _mode_columns() -> Columns:
+    """Modes of the flat walker by kind, and of Table 1's."""
+    rows = [
+        (label, mode)
+        for label, gait in (
+            ("C, passive", find_limit_cycle(flat_passive_walker())),
+            ("E, Table 1", table_1_gait()),
+        )
+        for mode in modes(gait)
+    ]
+    return {
+        "gait": [label for label, _ in rows],
+        "multiplier_real": [mode.eigenvalue.real for _, mode in rows],
+        "multiplier_imag": [mode.eigenvalue.imag for _, mode in rows],
+        "kind": [mode.name for _, mode in rows],
+        "lateral_share": [mode.lateral_share for _, mode in rows],
+        "why_zero": [mode.explanation for _, mode in rows],
+    }
