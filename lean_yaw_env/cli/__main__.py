@@ -1,0 +1,5 @@
+"""``python -m lean_yaw_env.cli``."""
+
+from lean_yaw_env.cli import main
+
+main()
