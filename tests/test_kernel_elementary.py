@@ -146,6 +146,13 @@ def test_the_pair_meets_every_order_condition(order: int, count: int) -> None:
             assert embedded @ _weights_of(tree, a) == pytest.approx(wanted, abs=2e-12)
 
 
+def test_weights_sum_to_one_and_estimates_to_nothing() -> None:
+    _, b, embedded = _tableau()
+    # the rounding of weights up to 32
+    assert abs(b.sum() - 1.0) < 2e-14
+    assert abs(embedded.sum() - 1.0) < 2e-14
+
+
 def test_the_embedded_result_is_of_seventh_order_only() -> None:
     a, _, embedded = _tableau()
     misses = [abs(embedded @ _weights_of(t, a) - 1 / _density(t)) for t in _rooted_trees(8)]

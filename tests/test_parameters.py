@@ -87,10 +87,8 @@ def test_a_range_s_ends_are_allowed_or_refused_as_stated(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", RANGES)
-@pytest.mark.parametrize("value", [math.nan, -math.inf, "wide", None, True, [0.3], 1j, 1e9])
+@pytest.mark.parametrize("value", [math.nan, -math.inf, "wide", None, True, [0.3], 1j, -1e9])
 def test_a_bad_parameter_is_refused_by_name_value_and_range(name: str, value: Any) -> None:
-    if name == "friction_limit" and value == 1e9:
-        pytest.skip("a floor may be as rough as one likes")
     low, high, bounds = RANGES[name]
     interval = f"{bounds[0]}{low:g}, {high:g}{bounds[1]}"
     pattern = f"^{name} must be .*{re.escape(interval)}.*{re.escape(repr(value))}$"
