@@ -1,0 +1,46 @@
+"""The full run: every benchmark, printed and kept in ``benchmarks/results`` with machine and versions."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+
+from benchmarks import environments, kernel, startup, training
+from benchmarks.bars import as_json, as_text
+from benchmarks.compare import as_text as comparison_text
+from benchmarks.compare import compare
+from benchmarks.machine import machine
+from benchmarks.plot import save_plot
+
+RESULTS = Path(__file__).parent / "results"
+
+
+def _write(text: str, path: Path) -> None:
+    """Write beside the file first: it is there whole or not at all."""
+    handle, name = tempfile.mkstemp(dir=path.parent, text=True)
+    with os.fdopen(handle, "w") as file:
+        file.write(text)
+    os.chmod(name, 0o644)  # a temporary file is its owner's alone
+    os.replace(name, path)
+
+
+def main() -> None:
+    """Measure all, print it, and keep it."""
+    figures = []
+    for benchmark in (kernel, environments, startup, training):
+        measured = benchmark.run(smallest=False)
+        print(as_text(measured), end="\n\n", flush=True)
+        figures += measured
+    speeds = compare(smallest=False)
+    print(comparison_text(speeds))
+    kept = as_json(figures) | {"comparison": [asdict(speed) for speed in speeds]}
+    RESULTS.mkdir(exist_ok=True)
+    _write(json.dumps(kept, indent=2) + "\n", RESULTS / "full.json")
+    save_plot(speeds, machine(), RESULTS / "comparison.png")
+
+
+if __name__ == "__main__":
+    main()

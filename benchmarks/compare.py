@@ -1,0 +1,168 @@
+"""Steps per second of this package and of what its users compare it with, on this machine, in one thread but where it says two.
+
+    python -m benchmarks.compare [--json] [--smallest] [--plot FILE]
+
+A step of the walker is a whole walking step, from heel strike to heel strike, with its end found exactly and its error controlled; the note beside a
+peer says what its step is instead.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import gymnasium as gym
+
+from benchmarks.environments import HEADING, single_steps, vector_steps, walkers
+from benchmarks.kernel import all_steps, single_step, two_cores
+from benchmarks.machine import machine
+from benchmarks.measure import FULL, SMALLEST, Effort, measure
+from benchmarks.plot import save_plot
+from benchmarks.populations import perturbed_gait
+from benchmarks.scipy_step import ScipyStep
+
+VECTOR = 1024
+BATCH = 4096
+EULER = "one Euler step of 0.02 s; no contact, no error control"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One bar of the figure: ``steps`` steps in a call of ``play``."""
+
+    name: str
+    play: Callable[[], object]
+    steps: int
+    note: str
+    ours: bool = False
+    threads: int = 1
+
+
+@dataclass(frozen=True)
+class Speed:
+    """A case's result."""
+
+    name: str
+    steps_per_second: float
+    microseconds_per_step: float
+    note: str
+    ours: bool
+
+
+def _own_cases(n: int, batch: int, steps: int) -> list[Case]:
+    population = perturbed_gait(batch)
+    own = "a whole walking step, to 1e-10"
+    return [
+        Case("kernel, batch, two threads", two_cores(population), batch, own, True, 2),
+        Case("kernel, batch", all_steps(population), batch, own, True),
+        Case("kernel, single call", single_step(perturbed_gait(1)), 1, own, True),
+        Case(f"{HEADING}, vector of {n}", vector_steps(walkers(n), "fixed"), n, "and the task", True),
+        Case(
+            f"{HEADING}, vector of {n}, masses moving", vector_steps(walkers(n), "random"), n,
+            "random actions", True,
+        ),
+        Case(HEADING, single_steps(HEADING, steps, "fixed"), steps, "unwrapped, Python", True),
+        Case(
+            f"{HEADING}, masses moving", single_steps(HEADING, steps, "random"), steps,
+            "random actions", True,
+        ),
+    ]  # fmt: skip
+
+
+def _classic_cases(n: int, steps: int) -> list[Case]:
+    cases = []
+    for env_id, note in (
+        ("CartPole-v1", EULER),
+        ("Pendulum-v1", "one Euler step of 0.05 s; no contact, no error control"),
+    ):
+        sync = gym.make_vec(env_id, num_envs=n, vectorization_mode="sync")
+        cases += [
+            Case(env_id, single_steps(env_id, steps, "random"), steps, note),
+            Case(f"{env_id}, SyncVectorEnv of {n}", vector_steps(sync, "random"), n, note),
+        ]
+    native = gym.make_vec("CartPole-v1", num_envs=n, vectorization_mode="vector_entry_point")
+    return [
+        *cases,
+        Case(f"CartPole-v1, native vector of {n}", vector_steps(native, "random"), n, EULER),
+    ]
+
+
+def _optional_cases(n: int, steps: int) -> list[Case]:
+    """Peers that are measured where they are installed."""
+    cases = []
+    if importlib.util.find_spec("mujoco"):
+        cases.append(
+            Case(
+                "Walker2d-v5 (MuJoCo)", single_steps("Walker2d-v5", steps, "random"), steps,
+                "4 fixed steps of 0.002 s, soft contact: a walking step takes some hundred",
+            )
+        )  # fmt: skip
+    if importlib.util.find_spec("envpool"):
+        import envpool  # pyright: ignore[reportMissingImports]
+
+        pool = envpool.make_gymnasium("CartPole-v1", num_envs=n, num_threads=1)
+        cases.append(Case(f"CartPole-v1, EnvPool of {n}", vector_steps(pool, "random"), n, EULER))
+    return cases
+
+
+def _scipy_case() -> Case:
+    scipy = ScipyStep(perturbed_gait(8))
+    return Case(
+        "scipy solve_ivp (DOP853)", lambda: [scipy.step(i) for i in range(8)], 8,
+        "the same walking step at the same accuracy, compiled right-hand side",
+    )  # fmt: skip
+
+
+def compare(smallest: bool) -> list[Speed]:
+    """All cases, fastest first."""
+    n, batch, steps = (4, 16, 4) if smallest else (VECTOR, BATCH, 200)
+    effort: Effort = SMALLEST if smallest else FULL
+    cases = [
+        *_own_cases(n, batch, steps), *_classic_cases(n, steps), *_optional_cases(n, steps),
+        _scipy_case(),
+    ]  # fmt: skip
+    seconds = {}
+    for threads in (1, 2):
+        group = {case.name: case.play for case in cases if case.threads == threads}
+        times = measure(group, effort, f"{threads} threads", threads=threads)
+        seconds |= {name: times.median(name) for name in group}
+    speeds = [
+        Speed(c.name, c.steps / seconds[c.name], seconds[c.name] / c.steps * 1e6, c.note, c.ours)
+        for c in cases
+    ]
+    return sorted(speeds, key=lambda speed: -speed.steps_per_second)
+
+
+def as_text(speeds: list[Speed]) -> str:
+    """A table, fastest first."""
+    width = max(len(speed.name) for speed in speeds)
+    lines = [f"{'':<{width}} {'steps/s':>12} {'us/step':>10}"]
+    for s in speeds:
+        lines.append(
+            f"{s.name:<{width}} {s.steps_per_second:>12,.0f} {s.microseconds_per_step:>10,.3g}  {s.note}"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Run as a program."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--smallest", action="store_true", help="only to see that it runs")
+    parser.add_argument("--plot", type=Path, help="PNG file for the figure")
+    arguments = parser.parse_args()
+    speeds = compare(arguments.smallest)
+    if arguments.plot:
+        save_plot(speeds, machine(), arguments.plot)
+    if arguments.json:
+        print(json.dumps({"speeds": [asdict(s) for s in speeds], "machine": machine()}, indent=2))
+    else:
+        print(as_text(speeds))
+
+
+if __name__ == "__main__":
+    main()
