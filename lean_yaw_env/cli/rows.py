@@ -96,7 +96,7 @@ def basin_records(data: xarray.Dataset, axes: Mapping[str, Vector]) -> list[Reco
     """One record for each start of a basin of attraction."""
     meanings = json.loads(data["ending"].attrs["meanings"])
     grids = np.meshgrid(*axes.values(), indexing="ij")
-    columns = {name: grid.ravel() for name, grid in zip(axes, grids, strict=True)}
+    columns: Record = {name: grid.ravel() for name, grid in zip(axes, grids, strict=True)}
     columns["steps"] = data["steps"].to_numpy().ravel().astype(int)
     columns["ending"] = [meanings[str(int(ending))] for ending in data["ending"].to_numpy().ravel()]
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]

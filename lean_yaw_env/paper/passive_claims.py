@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
@@ -19,7 +21,8 @@ from lean_yaw_env.paper.walkers import (
 )
 from lean_yaw_env.passive import PassiveWalker
 
-_LONGEST = {"most": 1.0, "tolerance": 1e-3}
+_FARTHEST, _TOLERANCE = 1.0, 1e-3
+"""Relative deviations looked at, and how finely."""
 _STEEP = 0.004
 _SECOND_SEARCH = (0.03, 0.045)
 """Slopes between which no ankle tilt stabilises the flat passive walker any more."""
@@ -45,7 +48,9 @@ def least_deviation(walker: PassiveWalker) -> tuple[float, str]:
     found = []
     for coordinate in ("stance_pitch", "stance_pitch_rate", "inter_leg_rate"):
         for upward in (True, False):
-            survived = largest_disturbance(walker, coordinate, upward=upward, **_LONGEST)
+            survived = largest_disturbance(
+                walker, coordinate, upward=upward, most=_FARTHEST, tolerance=_TOLERANCE
+            )
             found.append((abs(survived.relative), f"{coordinate} {'up' if upward else 'down'}"))
     return min(found)
 
@@ -65,9 +70,10 @@ def lateral_radius(slope: float) -> float:
     tilts = np.linspace(pitch - 0.03, pitch + 0.03, 61)
     best = int(np.argmin([radius(tilt) for tilt in tilts]))
     around = (tilts[max(best - 1, 0)], tilts[min(best + 1, tilts.size - 1)])
-    return float(
-        minimize_scalar(radius, bounds=around, method="bounded", options={"xatol": 1e-6}).fun
+    best_found: Any = minimize_scalar(
+        radius, bounds=around, method="bounded", options={"xatol": 1e-6}
     )
+    return float(best_found.fun)
 
 
 def lateral_limit_slope() -> float:

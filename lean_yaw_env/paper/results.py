@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from lean_yaw_env.paper.checks import Check
 
-Columns = Mapping[str, Sequence[Any]]
+Columns = Mapping[str, Iterable[Any]]
 """Equally long columns by their headings."""
 
 

@@ -61,7 +61,7 @@ def velocity_map(slopes: int = 100, radii: int = 91) -> VelocityMap:
     axes = {
         "ankle_tilt": np.array(numbers.CRITICAL_TILTS),
         # Closer where it is gentle, for there the speed changes fast
-        "slope": np.linspace(*np.sqrt(_SLOPES), slopes) ** 2,
+        "slope": np.linspace(_SLOPES[0] ** 0.5, _SLOPES[1] ** 0.5, slopes) ** 2,
         "foot_radius": np.linspace(*_RADII, radii),
     }
     data = stability_map(flat_active_walker(), axes, threads=2)

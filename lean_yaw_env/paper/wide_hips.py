@@ -102,7 +102,7 @@ def widest_stable_hip() -> tuple[float, float]:
 
 def _least_radius(width: float) -> tuple[float, float]:
     """The least spectral radius over the tilt at a hip width, and the tilt."""
-    start, state = _gait_at(_ENTRIES[1], width)
+    start, state = gait_at(_ENTRIES[1], width)
     tilts, radii = _dense(_branch(start, state, upward=False))
     lowest = int(np.argmin(radii))
     return float(radii[lowest]), float(tilts[lowest])
@@ -139,7 +139,7 @@ def _branches(width: float) -> list[Branch]:
     found = []
     for tilt in _ENTRIES:
         try:
-            start, state = _gait_at(tilt, width)
+            start, state = gait_at(tilt, width)
         except NoGaitError:
             continue
         found.extend(_branch(start, state, upward) for upward in (True, False))
@@ -152,7 +152,7 @@ def _branch(start: PassiveWalker, state: Vector, upward: bool) -> Branch:
     )
 
 
-def _gait_at(tilt: float, width: float) -> tuple[PassiveWalker, Vector]:
+def gait_at(tilt: float, width: float) -> tuple[PassiveWalker, Vector]:
     """The gait at a tilt and hip width, of the branch from no hip width."""
     flat = _entry_walker(tilt, 0.0)
     state = passive_gait(flat).state
