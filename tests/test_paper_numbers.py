@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lean_yaw_env.analysis import continue_gait
 from lean_yaw_env.paper import (
     active_claims,
     passive_claims,
