@@ -66,12 +66,13 @@ class WaypointGoalEnv(WalkerEnv):
             "achieved_goal": 2,
             "desired_goal": 2,
         }
-        self.observation_space = spaces.Dict(
+        space: Any = spaces.Dict(
             {
                 key: spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (size,), np.float32)
                 for key, size in box.items()
             }
         )
+        self.observation_space = space
         self._goal = np.zeros(2, dtype=np.float32)
 
     def reset(  # pyright: ignore[reportIncompatibleMethodOverride]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -48,7 +48,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         As ``WalkerEnv``.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {}  # pyright: ignore[reportIncompatibleVariableOverride]
+    metadata: dict[str, Any] = {}  # noqa: RUF012 (each environment sets its own)
 
     def __init__(
         self,

@@ -38,16 +38,18 @@ def borrowed(array: Any) -> Any:
     return array
 
 
-@intrinsic
-def _without_owner(typing_context, array):
+def _without_owner_code(typing_context, array):
     def generate(context, builder, signature, arguments):
         view = context.make_array(signature.return_type)(context, builder, arguments[0])
         view.meminfo = cgutils.get_null_value(view.meminfo.type)
         view.parent = cgutils.get_null_value(view.parent.type)
         return view._getvalue()
 
-    unowned: Any = array  # a Numba type, called to make a signature
-    return unowned(array), generate
+    return array(array), generate
+
+
+# The code's first argument is the compiler's own, which the type hints do not know
+_without_owner: Any = intrinsic(_without_owner_code)
 
 
 @overload(borrowed)
