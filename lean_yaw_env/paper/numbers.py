@@ -177,7 +177,7 @@ WIDEST_STABLE_HIP = PaperNumber(
 )
 NO_STABLE_HIP = Statement(
     "no stable gait, D",
-    "none for any α, 0.05 < d ≤ 0.2",
+    "ever increasing eigenvalues in a search up to d = 0.2",
     "section 4.1, Figure 9",
     "passive gaits with wider hips",
 )

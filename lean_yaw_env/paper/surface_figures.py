@@ -166,7 +166,8 @@ def figure_9() -> Result:
                 grows,
                 ours=f"least greatest |λ| at d = {', '.join(f'{row.hip_width:.2f}' for row in wide)}: "
                 f"{', '.join(f'{value:.2f}' for value in least)}",
-                remark="Beyond our limit of the row above; this gait ends in a fold near d = 0.136."
+                remark="Beyond our limit, in the row above, none is stable; this gait ends in a fold "
+                "near d = 0.136, and none was found beyond."
                 if grows
                 else "It does not grow with the hip width.",
             ),
