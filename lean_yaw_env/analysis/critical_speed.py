@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from lean_yaw_env.analysis.continuation import Branch, continue_gait
 from lean_yaw_env.analysis.limit_cycle import cycle_at, find_limit_cycle
 from lean_yaw_env.errors import NoGaitError
@@ -17,7 +19,7 @@ from lean_yaw_env.walker import Walker
 
 LEAST_SLOPE, GREATEST_SLOPE = 1e-5, 0.3
 """Between which slopes the gait is looked for, rad."""
-_TRIED = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25)
+_TRIED = tuple(np.geomspace(0.0005, 0.25, 28).tolist())
 """Slopes at which a stable gait is looked for, the gentlest first."""
 
 
