@@ -9,6 +9,7 @@ from pathlib import Path
 from agents.agent import Agent
 from agents.controllers import FixedController, RandomController
 from agents.files import read_json
+from agents.guidance import guided
 from agents.heading_feedback import HeadingFeedback
 from agents.storage import CARD_FILE, load, task_of
 from lean_yaw_env.envs.options import EnvOptions
@@ -50,6 +51,7 @@ AGENTS: dict[str, Callable[[AgentRequest], Agent]] = {
     "fixed": lambda request: FixedController(),
     "feedback": _feedback,
     "ppo": _ppo,
+    "lqr": lambda request: guided(task_of(request.env_id), request.options),
 }
 """Every agent, in the order of tables."""
 

@@ -1,0 +1,236 @@
+"""Guidance over the heading regulator: along a path, and from goal to goal. They say where to head; ``lqr`` brings the walker there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from agents.agent import State
+from agents.lqr import HeadingLqr, LqrLoop, LqrSettings
+from agents.observations import ObservationLayout
+from agents.regulator import LqrWeights
+from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.parameters import Vector
+
+_PREVIEW = "preview_"
+
+
+@dataclass(frozen=True)
+class PathSettings:
+    """Settings of ``PathGuidance``.
+
+    Attributes
+    ----------
+    ahead : leg lengths, downhill
+        Whose path direction is taken: the walker answers that much late.
+    approach : leg lengths
+        Within which a small cross-track error is made good.
+    loop : LqrSettings
+    """
+
+    ahead: float = 1.5
+    approach: float = 3.0
+    loop: LqrSettings = field(default_factory=LqrSettings)
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.ahead <= 8.0:
+            raise ValueError(f"ahead must be in [0, 8], not {self.ahead!r}")
+        if not 0.0 < self.approach < math.inf:
+            raise ValueError(f"approach must be in (0, inf), not {self.approach!r}")
+
+
+class PathGuidance:
+    """Follows a path that is seen ahead: its direction there, and towards it as far as the walker is beside it.
+
+    The path ahead is the polynomial through where it is beside the walker, its direction there, and its previews. It remembers nothing.
+
+    Parameters
+    ----------
+    task : str
+        A task that shows a path.
+    options : EnvOptions
+        Those of the environment.
+    settings : PathSettings
+
+    Raises
+    ------
+    ValueError
+        If the task shows no path.
+    NoGaitError
+        If the walker has no gait down its slope.
+    """
+
+    def __init__(
+        self,
+        task: str = "Slalom",
+        options: EnvOptions | None = None,
+        settings: PathSettings | None = None,
+    ) -> None:
+        chosen = EnvOptions() if options is None else options
+        _require(task, chosen, ("cross_track_error", "path_heading_error"))
+        self._settings = PathSettings() if settings is None else settings
+        self._loop = LqrLoop(task, chosen, self._settings.loop)
+        names = [name for name in self._loop.layout.names if name.startswith(_PREVIEW)]
+        self._previews = [(name, float(name.removeprefix(_PREVIEW))) for name in names]
+        self._slope_ahead = self._slope_weights()
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: State = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.float32], State]:
+        """Actions along the path; see ``Agent.predict``."""
+        layout = self._loop.layout
+        seen = layout.require(observation)
+        heading = self._mean_heading(seen)
+        aside = layout.quantity(seen, "cross_track_error")
+        path_heading = heading + layout.quantity(seen, "path_heading_error")
+        slope = np.tan(-np.clip(path_heading, -1.4, 1.4))  # to the right per downhill
+        points = [-aside * np.sqrt(1.0 + slope**2), slope]
+        for name, ahead in self._previews:
+            left = layout.quantity(seen, name)
+            points.append(-(left + ahead * np.sin(heading)) / np.cos(heading))
+        there = np.stack(points, axis=-1) @ self._slope_ahead
+        wanted = -np.arctan(there) + np.arctan(aside / self._settings.approach)
+        return self._loop.actions(seen, wanted - heading), None
+
+    def _mean_heading(self, seen: NDArray[np.float32]) -> Vector:
+        """Of the last two footprints, within what previews can be turned back from."""
+        layout = self._loop.layout
+        heading = layout.quantity(seen, "heading")
+        turned = self._loop.last_turn(seen)
+        return np.clip(heading - 0.5 * turned, -1.4, 1.4)
+
+    def _slope_weights(self) -> Vector:
+        """What the polynomial's slope ahead is made of: the path's place and slope beside the walker, and its places ahead."""
+        distances = np.array([ahead for _, ahead in self._previews])
+        powers = np.arange(len(distances) + 2)
+        conditions = np.vstack(
+            [0.0**powers, np.where(powers == 1, 1.0, 0.0), distances[:, None] ** powers]
+        )
+        ahead = self._settings.ahead
+        slope = np.where(powers > 0, powers * ahead ** np.maximum(powers - 1, 0), 0.0)
+        return slope @ np.linalg.inv(conditions)
+
+
+def _waypoint_loop() -> LqrSettings:
+    return LqrSettings(
+        LqrWeights(
+            heading=0.072,
+            ankle_angle=0.12,
+            stance_pitch_rate=2.5,
+            ankle_rate=0.76,
+            inter_leg_angle=0.08,
+            offset_change=0.0098,
+        ),
+        inter_leg_angle=0.389,
+        largest_error=0.43,
+    )
+
+
+@dataclass(frozen=True)
+class WaypointSettings:
+    """Settings of ``WaypointGuidance``.
+
+    Attributes
+    ----------
+    radius : leg lengths
+        Of the turn that can be relied on. A goal within that turn's circle is not turned to, which would be orbiting it; the walker
+        goes straight on until it can.
+    turning_bearing : rad
+        Bearing from which on the walker turns with the steps of ``loop.inter_leg_angle``: long ones lean, and so turn, most.
+    fast_angle : rad
+        Inter-leg angle straight on: short steps are faster.
+    loop : LqrSettings
+    """
+
+    radius: float = 5.2
+    turning_bearing: float = 0.31
+    fast_angle: float = 0.297
+    loop: LqrSettings = field(default_factory=_waypoint_loop)
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.radius < math.inf:
+            raise ValueError(f"radius must be in [0, inf), not {self.radius!r}")
+
+
+class WaypointGuidance:
+    """Walks to goals, past those that it cannot turn to, and back. It remembers nothing.
+
+    Parameters
+    ----------
+    task : str
+        A task that shows a goal.
+    options : EnvOptions
+        Those of the environment.
+    settings : WaypointSettings
+
+    Raises
+    ------
+    ValueError
+        If the task shows no goal.
+    NoGaitError
+        If the walker has no gait down its slope.
+    """
+
+    def __init__(
+        self,
+        task: str = "Waypoint",
+        options: EnvOptions | None = None,
+        settings: WaypointSettings | None = None,
+    ) -> None:
+        chosen = EnvOptions() if options is None else options
+        _require(task, chosen, ("goal_bearing", "goal_distance"))
+        self._settings = WaypointSettings() if settings is None else settings
+        self._loop = LqrLoop(task, chosen, self._settings.loop)
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: State = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.float32], State]:
+        """Actions to the goal; see ``Agent.predict``."""
+        layout = self._loop.layout
+        seen = layout.require(observation)
+        bearing = layout.quantity(seen, "goal_bearing")
+        distance = layout.quantity(seen, "goal_distance")
+        # a circle through here along the heading and through the goal has this radius: distance / (2 sin(bearing))
+        can_turn = distance >= 2.0 * self._settings.radius * np.abs(np.sin(bearing))
+        error = np.where(can_turn, bearing, 0.0)
+        fast, slow = self._settings.fast_angle, self._settings.loop.inter_leg_angle
+        share = np.minimum(np.abs(error) / self._settings.turning_bearing, 1.0)
+        return self._loop.actions(seen, error, inter_leg_angle=fast + share * (slow - fast)), None
+
+
+def _require(task: str, options: EnvOptions, needs: tuple[str, ...]) -> None:
+    names = ObservationLayout.of(task, options).names
+    for name in needs:
+        if name not in names:
+            raise ValueError(
+                f"task must show {name} to be guided by, but {task!r} shows {', '.join(names)}"
+            )
+
+
+def guided(task: str, options: EnvOptions) -> HeadingLqr | PathGuidance | WaypointGuidance:
+    """The regulator with the guidance that a task's observations call for.
+
+    Raises
+    ------
+    ValueError
+        If the task shows no heading error, path or goal, or its slope does not go down.
+    NoGaitError
+        If the walker has no gait down its slope.
+    """
+    names = ObservationLayout.of(task, options).names
+    if "goal_bearing" in names:
+        return WaypointGuidance(task, options)
+    if "cross_track_error" in names:
+        return PathGuidance(task, options)
+    return HeadingLqr(task, options)
