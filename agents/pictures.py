@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import EngFormatter, MaxNLocator
 
 from agents.agent import Agent
 from agents.episodes import record_episode
@@ -55,7 +55,8 @@ def save_learning_curve(
         if row.metric == "return":
             style = _STYLES.get(row.agent, "-")
             axes.axhline(row.mean, color="black", linewidth=1.0, linestyle=style, label=f"{row.agent}, evaluated: {row.mean:.1f}")  # fmt: skip
-    axes.set_xlabel("environment steps (walking steps)")
+    axes.xaxis.set_major_formatter(EngFormatter(sep=""))
+    axes.set_xlabel("walking steps trained (k: thousands, M: millions)")
     axes.set_ylabel("return of an episode")
     axes.set_title(title)
     axes.set_xlim(0, trained_steps)

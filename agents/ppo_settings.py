@@ -85,7 +85,9 @@ class PPOSettings:
 
 
 SETTINGS: dict[str, PPOSettings] = {
-    "LeanYaw/Heading-v0": PPOSettings(push_level=0.05),
+    "LeanYaw/Heading-v0": PPOSettings(
+        steps=2_400_000, walkers=256, batch_size=2048, learning_rate=3e-3, push_level=0.05
+    ),
     "LeanYaw/Walk-v0": PPOSettings(steps=200_000),
 }
 """Settings that were tuned for an environment."""
