@@ -18,6 +18,21 @@ from lean_yaw_env.parameters import Vector
 _PREVIEW = "preview_"
 
 
+def _path_loop() -> LqrSettings:
+    return LqrSettings(
+        LqrWeights(
+            heading=0.18,
+            ankle_angle=0.46,
+            stance_pitch_rate=0.11,
+            ankle_rate=1.4,
+            inter_leg_angle=0.055,
+            offset_change=0.0083,
+        ),
+        inter_leg_angle=0.278,
+        largest_error=1.13,
+    )
+
+
 @dataclass(frozen=True)
 class PathSettings:
     """Settings of ``PathGuidance``.
@@ -31,9 +46,9 @@ class PathSettings:
     loop : LqrSettings
     """
 
-    ahead: float = 1.5
-    approach: float = 3.0
-    loop: LqrSettings = field(default_factory=LqrSettings)
+    ahead: float = 2.4
+    approach: float = 6.0
+    loop: LqrSettings = field(default_factory=_path_loop)
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.ahead <= 8.0:
@@ -121,15 +136,15 @@ class PathGuidance:
 def _waypoint_loop() -> LqrSettings:
     return LqrSettings(
         LqrWeights(
-            heading=0.072,
-            ankle_angle=0.12,
-            stance_pitch_rate=2.5,
-            ankle_rate=0.76,
-            inter_leg_angle=0.08,
-            offset_change=0.0098,
+            heading=0.096,
+            ankle_angle=0.14,
+            stance_pitch_rate=2.8,
+            ankle_rate=0.41,
+            inter_leg_angle=0.071,
+            offset_change=0.011,
         ),
-        inter_leg_angle=0.389,
-        largest_error=0.43,
+        inter_leg_angle=0.364,
+        largest_error=0.46,
     )
 
 
@@ -149,9 +164,9 @@ class WaypointSettings:
     loop : LqrSettings
     """
 
-    radius: float = 5.2
-    turning_bearing: float = 0.31
-    fast_angle: float = 0.297
+    radius: float = 4.1
+    turning_bearing: float = 0.23
+    fast_angle: float = 0.281
     loop: LqrSettings = field(default_factory=_waypoint_loop)
 
     def __post_init__(self) -> None:

@@ -104,10 +104,12 @@ class LqrLoop:
         side, settings = self.side(seen), self.settings
         state = self._section_state(seen, side)
         offset = side * self.layout.quantity(seen, "mass_offset")
-        low, high = self.schedule.headings[[0, -1]]
         error = np.clip(side * error, -settings.largest_error, settings.largest_error)
-        heading = np.clip(state[..., 0] + error, low, high)
+        heading = state[..., 0]
         if self.schedule.has_downhill:
+            # no gait is known beyond the schedule's headings
+            low, high = self.schedule.headings[[0, -1]]
+            heading = np.clip(state[..., 0] + error, low, high)
             error = heading - state[..., 0]
         angle = np.full(error.shape, settings.inter_leg_angle)
         if inter_leg_angle is not None:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,7 @@ from lean_yaw_env.walker import Walker
 SIZE = STATE_SIZE + 1
 """Of the regulated state: the section state and the mass offset in force."""
 ANGLES = tuple(np.linspace(0.15, 0.45, 13).tolist())
-_HEADINGS = tuple(np.linspace(-0.7, 0.7, 9).tolist())
+HEADINGS = tuple(np.linspace(-0.7, 0.7, 9).tolist())
 _PRIOR = (0.01, 0.03, 0.05, 0.08, 0.03)
 """How far states stray from the gait, heading apart; weighs what the last step's turn is estimated from."""
 _COLUMNS = np.cumsum((STATE_SIZE, 1, 1, 2 * SIZE, STATE_SIZE))
@@ -175,6 +176,67 @@ class GaitNode:
     step: LinearStep
 
 
+class _GaitGrid:
+    """Follows gaits over a grid of inter-leg angles and headings."""
+
+    def __init__(self, parameters: WalkerParameters, angles: Vector, headings: Vector) -> None:
+        self._walker = Walker(replace(parameters, friction_limit=math.inf))
+        self._turns = parameters.slope_turns
+        self.angles, self.headings = angles, headings
+
+    def nodes(self, start: Vector) -> list[list[GaitNode]]:
+        """Gaits of the grid, each followed from its neighbour; where one is lost, its neighbour stands for it."""
+        rows: dict[int, list[GaitNode]] = {}
+        middle = int(np.argmin(np.abs(self.angles - INTER_LEG_ANGLE)))
+        straight = self._node(self.angles[middle], 0.0, start)
+        for way in (range(middle, -1, -1), range(middle, len(self.angles))):
+            seed = straight
+            for i in way:
+                seed = self._node_or(seed, self.angles[i], 0.0)
+                rows[i] = self._row(self.angles[i], seed)
+        return [rows[i] for i in range(len(self.angles))]
+
+    def _row(self, angle: float, straight: GaitNode) -> list[GaitNode]:
+        if self._turns:
+            return [straight] * len(self.headings)
+        half = len(self.headings) // 2
+        sides: list[list[GaitNode]] = []
+        for headings in (self.headings[half - 1 :: -1], self.headings[half + 1 :]):
+            side, node = [], straight
+            for heading in headings:
+                node = self._node_or(node, angle, float(heading))
+                side.append(node)
+            sides.append(side)
+        return [*sides[0][::-1], straight, *sides[1]]
+
+    def _node_or(self, seed: GaitNode, angle: float, heading: float) -> GaitNode:
+        start = seed.state.copy()
+        start[0] += heading
+        try:
+            return self._node(angle, heading, start)
+        except NoGaitError:
+            return seed
+
+    def _node(self, angle: float, heading: float, start: Vector) -> GaitNode:
+        walker = self._walker
+        offset = 0.0 if self._turns else -math.tan(walker.parameters.slope) * math.sin(heading)
+        two_steps = ActiveMap(walker, angle, (offset, offset))
+        state = solve_fixed_point(two_steps, start, exact=True)
+        first, second = two_steps.results(state)
+        chord = float(np.linalg.norm(first.displacement + second.displacement))
+        step = linearise_step(walker, state, angle, offset)
+        apart = state.copy()
+        apart[0] = 0.5 * (state[0] - first.state[0])
+        return GaitNode(apart, offset, chord / (first.duration + second.duration), step)
+
+
+@lru_cache(maxsize=16)
+def _gait_nodes(parameters: WalkerParameters) -> tuple[tuple[GaitNode, ...], ...]:
+    """Gaits and linear steps of the whole grid, which do not depend on what is optimised."""
+    grid = _GaitGrid(parameters, np.array(ANGLES), np.array(HEADINGS))
+    return tuple(tuple(row) for row in grid.nodes(np.array(gait_of(parameters))))
+
+
 class GainSchedule:
     """Gaits and optimal gains over inter-leg angle and heading, linear between the nodes of a grid.
 
@@ -199,12 +261,10 @@ class GainSchedule:
     """
 
     def __init__(self, parameters: WalkerParameters, weights: LqrWeights) -> None:
-        self._walker = Walker(replace(parameters, friction_limit=math.inf))
-        self._turns = parameters.slope_turns
-        self.has_downhill = not self._turns
+        self.has_downhill = not parameters.slope_turns
         self.angles = np.array(ANGLES)
-        self.headings = np.array([-1.0, 1.0]) if self._turns else np.array(_HEADINGS)
-        nodes = self._nodes(np.array(gait_of(parameters)))
+        self.headings = np.array(HEADINGS)
+        nodes = _gait_nodes(parameters)
         values = np.array(
             [[self._values(row[k], row[-1 - k], weights) for k in range(len(row))] for row in nodes]
         )
@@ -240,51 +300,6 @@ class GainSchedule:
             inverse = np.interp(speeds, self.speeds[::-1, column], self.angles[::-1])
             found = np.where(columns == column, inverse, found)
         return found
-
-    def _nodes(self, start: Vector) -> list[list[GaitNode]]:
-        """Gaits of the grid, each followed from its neighbour; where one is lost, its neighbour stands for it."""
-        rows: dict[int, list[GaitNode]] = {}
-        middle = int(np.argmin(np.abs(self.angles - INTER_LEG_ANGLE)))
-        straight = self._node(self.angles[middle], 0.0, start)
-        for way in (range(middle, -1, -1), range(middle, len(self.angles))):
-            seed = straight
-            for i in way:
-                seed = self._node_or(seed, self.angles[i], 0.0)
-                rows[i] = self._row(self.angles[i], seed)
-        return [rows[i] for i in range(len(self.angles))]
-
-    def _row(self, angle: float, straight: GaitNode) -> list[GaitNode]:
-        if self._turns:
-            return [straight, straight]
-        half = len(self.headings) // 2
-        sides: list[list[GaitNode]] = []
-        for headings in (self.headings[half - 1 :: -1], self.headings[half + 1 :]):
-            side, node = [], straight
-            for heading in headings:
-                node = self._node_or(node, angle, float(heading))
-                side.append(node)
-            sides.append(side)
-        return [*sides[0][::-1], straight, *sides[1]]
-
-    def _node_or(self, seed: GaitNode, angle: float, heading: float) -> GaitNode:
-        start = seed.state.copy()
-        start[0] += heading
-        try:
-            return self._node(angle, heading, start)
-        except NoGaitError:
-            return seed
-
-    def _node(self, angle: float, heading: float, start: Vector) -> GaitNode:
-        walker = self._walker
-        offset = 0.0 if self._turns else -math.tan(walker.parameters.slope) * math.sin(heading)
-        two_steps = ActiveMap(walker, angle, (offset, offset))
-        state = solve_fixed_point(two_steps, start, exact=True)
-        first, second = two_steps.results(state)
-        chord = float(np.linalg.norm(first.displacement + second.displacement))
-        step = linearise_step(walker, state, angle, offset)
-        apart = state.copy()
-        apart[0] = 0.5 * (state[0] - first.state[0])
-        return GaitNode(apart, offset, chord / (first.duration + second.duration), step)
 
     @staticmethod
     def _values(node: GaitNode, mirrored: GaitNode, weights: LqrWeights) -> Vector:

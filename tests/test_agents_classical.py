@@ -1,0 +1,249 @@
+"""Regulation and guidance: optimal and stabilising by the exact map, mirror-symmetric, and better than what they replace."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import solve_discrete_lyapunov
+
+from agents import AgentRequest, HeadingFeedback, make_agent
+from agents.evaluation import run_episodes
+from agents.guidance import (
+    PathGuidance,
+    PathSettings,
+    WaypointGuidance,
+    WaypointSettings,
+    guided,
+)
+from agents.lqr import HeadingLqr, LqrSettings
+from agents.observations import ObservationLayout
+from agents.regulator import GainSchedule, LqrWeights, last_turn, linearise_step, periodic_gain
+from lean_yaw_env import Walker, WalkerParameters
+from lean_yaw_env.analysis.fixed_point import solve_fixed_point
+from lean_yaw_env.analysis.limit_cycle import cycle_at, find_gait
+from lean_yaw_env.analysis.section_map import ActiveMap
+from lean_yaw_env.envs.options import EnvOptions, gait_of
+from lean_yaw_env.envs.walker_env import WalkerEnv
+from lean_yaw_env.parameters import MIRROR
+
+WEIGHTS = LqrWeights()
+RAW = EnvOptions(mirror=False)
+TASKS = ("Heading", "SpeedHeading", "Slalom", "Waypoint")
+AGENTS_BY_TASK = {task: guided(task, EnvOptions()) for task in TASKS}
+AGENTS_OF_RAW = {task: guided(task, RAW) for task in TASKS}
+
+
+@pytest.fixture(scope="module")
+def schedule() -> GainSchedule:
+    return GainSchedule(WalkerParameters(), WEIGHTS)
+
+
+def mirrored_step(walker, state, offset, angle, change):
+    """The regulated state after one step, in the frame of the left foot; the step itself, not its derivatives."""
+    after = walker.step(
+        state, inter_leg_angle=angle, mass_offset=offset + change, previous_offset=offset
+    )
+    return np.append(MIRROR * after.state, -after.mass_offset)
+
+
+def test_the_linear_step_is_the_limit_of_small_differences(walker, gait):
+    step = linearise_step(walker, gait, 0.3, 0.0)
+    small = 1e-6
+    for column in range(6):
+        nudge = small * np.eye(6)[column]
+        ahead = mirrored_step(walker, gait + nudge[:5], nudge[5], 0.3, 0.0)
+        back = mirrored_step(walker, gait - nudge[:5], -nudge[5], 0.3, 0.0)
+        # central differences: small^2 times the third derivative, and round-off of 1e-13 / small
+        assert np.allclose(step.by_state[:, column], (ahead - back) / (2.0 * small), atol=2e-6)
+    for column, (angle, change) in enumerate([(small, 0.0), (0.0, small)]):
+        ahead = mirrored_step(walker, gait, 0.0, 0.3 + angle, change)
+        back = mirrored_step(walker, gait, 0.0, 0.3 - angle, -change)
+        assert np.allclose(step.by_input[:, column], (ahead - back) / (2.0 * small), atol=2e-6)
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.3, -0.6])
+def test_feedback_pulls_all_eigenvalues_of_the_stride_inside_those_of_the_open_loop(
+    walker, heading
+):
+    offset = -math.tan(0.01) * math.sin(heading)
+    left, right = _held_gaits(walker, offset)
+    now, then = (
+        linearise_step(walker, left, 0.3, offset),
+        linearise_step(walker, right, 0.3, -offset),
+    )
+    one, other = periodic_gain(now, then, WEIGHTS), periodic_gain(then, now, WEIGHTS)
+    closed = (then.by_state - then.by_input @ other) @ (now.by_state - now.by_input @ one)
+    # without feedback the offset stays where it is: the stride of the walker alone
+    free = (then.by_state @ now.by_state)[:5, :5]
+    assert np.abs(np.linalg.eigvals(closed)).max() < np.abs(np.linalg.eigvals(free)).max() < 1.0
+
+
+def _held_gaits(walker, offset):
+    """The gait that an offset holds, and its right stance as a left one."""
+    left = find_gait(walker, mass_offset=offset)
+    return left, MIRROR * walker.step(left, mass_offset=offset).state
+
+
+def test_the_gain_is_worth_no_less_than_any_near_it(walker, gait):
+    step = linearise_step(walker, gait, 0.3, 0.0)
+    gain = periodic_gain(step, step, WEIGHTS)
+    state_cost, input_cost = WEIGHTS.matrices()
+
+    def cost_to_go(feedback):
+        closed = step.by_state - step.by_input @ feedback
+        return np.trace(
+            solve_discrete_lyapunov(closed.T, state_cost + feedback.T @ input_cost @ feedback)
+        )
+
+    best = cost_to_go(gain)
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        # 2 % of each gain: well above round-off, well within stability
+        near = gain * (1.0 + 0.02 * rng.normal(size=gain.shape))
+        assert cost_to_go(near) > best
+
+
+def test_the_last_turn_follows_from_the_state_that_it_left(walker, gait):
+    weights = last_turn(linearise_step(walker, gait, 0.3, 0.0), WEIGHTS)
+    base = walker.step(gait)
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        start = gait + rng.uniform(-0.01, 0.01, 5) * [0, 1, 1, 1, 1]
+        after = walker.step(start, mass_offset=0.004, previous_offset=0.0)
+        turned = after.state[0] - base.state[0]
+        left = np.append(MIRROR * (after.state - base.state), -0.004)[1:]
+        # the turn is read off the left-hand frame; what is left is of second order in 0.01
+        assert -weights @ left == pytest.approx(turned, abs=2e-3)
+        assert abs(turned) < 0.2
+
+
+def test_scheduled_speeds_are_those_of_the_angles_they_give(schedule):
+    speeds = np.linspace(0.3, 0.55, 6)
+    angles = schedule.angles_of(speeds, np.zeros(6))
+    for speed, angle in zip(speeds, angles, strict=True):
+        # linear between angles 0.025 apart
+        walker = Walker(WalkerParameters())
+        gait = schedule.at(np.array(angle), np.array(0.0))[0]
+        found = solve_fixed_point(ActiveMap(walker, float(angle)), gait)
+        cycle = cycle_at(ActiveMap(walker, float(angle)), found)
+        assert cycle.speed == pytest.approx(speed, abs=2e-3)
+
+
+@settings(max_examples=25, deadline=None)
+@given(numbers=st.lists(st.floats(-2.0, 2.0), min_size=12, max_size=12))
+def test_the_other_foot_is_answered_by_the_mirror_image(numbers):
+    odd = ("heading", "ankle_angle", "ankle_rate", "mass_offset", "stance_foot", "heading_error")
+    odd += ("cross_track_error", "path_heading_error", "preview", "goal_bearing")
+    for task, agent in AGENTS_OF_RAW.items():
+        names = ObservationLayout.of(task, RAW).names
+        seen = np.array(numbers[: len(names)], dtype=np.float32)
+        seen[names.index("stance_foot")] = 1.0
+        flips = np.array([-1.0 if name.startswith(odd) else 1.0 for name in names])
+        one, other = agent.predict(seen)[0], agent.predict((flips * seen).astype(np.float32))[0]
+        assert one == pytest.approx(other * np.array([1.0, -1.0]), abs=1e-5)  # float32
+
+
+@pytest.mark.parametrize("task", ["Heading", "SpeedHeading", "Slalom", "Waypoint"])
+@pytest.mark.parametrize("shape", [(), (3,), (2, 3)])
+def test_actions_have_the_observations_shape_and_lie_in_the_action_space(task, shape):
+    agent = AGENTS_BY_TASK[task]
+    width = len(ObservationLayout.of(task, EnvOptions()).names)
+    seen = np.random.default_rng(0).uniform(-10.0, 10.0, (*shape, width)).astype(np.float32)
+    actions, state = agent.predict(seen)
+    assert state is None
+    assert actions.shape == (*shape, 2)
+    assert actions.dtype == np.float32
+    assert np.abs(actions).max() <= 1.0
+    # each row is answered as if it were alone
+    if shape:
+        alone = agent.predict(seen[(0,) * len(shape)])[0]
+        assert actions[(0,) * len(shape)] == pytest.approx(alone, abs=1e-6)
+
+
+def test_the_gait_itself_is_answered_by_its_own_command():
+    env = WalkerEnv("Heading", start_disturbance=0.0)
+    seen, _ = env.reset(seed=0, options={"command": 0.0})
+    lqr = HeadingLqr(settings=LqrSettings(inter_leg_angle=0.3))
+    # the start's mean heading is one footprint's, 0.0015 rad off the gait's
+    assert np.abs(lqr.predict(seen)[0]).max() < 0.02
+
+
+def test_a_commanded_speed_is_walked_where_heading_feedback_ignores_it():
+    regulated = run_episodes(AGENTS_BY_TASK["SpeedHeading"], "SpeedHeading", episodes=48)
+    steered = run_episodes(HeadingFeedback("SpeedHeading"), "SpeedHeading", episodes=48)
+    assert regulated.survived.all()
+    error = "mean_absolute_speed_error"
+    # measured over 128 episodes: 0.056 against 0.134
+    assert regulated.metrics[error].mean() < 0.7 * steered.metrics[error].mean()
+    assert regulated.metrics["return"].mean() > steered.metrics["return"].mean()
+
+
+def test_headings_are_reached_as_closely_as_by_tuned_feedback():
+    regulated = run_episodes(AGENTS_BY_TASK["Heading"], "Heading", episodes=48)
+    assert regulated.survived.all()
+    # measured over 128 episodes: 0.055 rad; the paper's fixed controller is 0.30 off
+    assert regulated.metrics["mean_absolute_heading_error"].mean() < 0.07
+
+
+def test_goals_are_reached_and_not_orbited():
+    results = run_episodes(AGENTS_BY_TASK["Waypoint"], "Waypoint", episodes=48)
+    # measured over 128 episodes: 4.1 goals in 300 units of time, none without a goal; pure pursuit reaches 2.8
+    assert results.survived.mean() > 0.9
+    assert results.metrics["goals"].mean() > 3.2
+    assert results.metrics["goals"].min() >= 1.0
+
+
+@pytest.mark.parametrize("bearing", [0.5 * math.pi, -0.5 * math.pi])
+def test_a_goal_within_the_turning_circle_is_not_turned_to(bearing):
+    layout = ObservationLayout.of("Waypoint", EnvOptions())
+    inside, ahead = (_seen(layout, goal_distance=2.0, goal_bearing=b) for b in (bearing, 0.0))
+    outside = _seen(layout, goal_distance=14.0, goal_bearing=bearing)
+    agent = AGENTS_BY_TASK["Waypoint"]
+    straight = agent.predict(ahead)[0][1]
+    assert agent.predict(inside)[0][1] == straight
+    # to the left (positive) by an offset to the left (negative)
+    assert math.copysign(1.0, straight - agent.predict(outside)[0][1]) == math.copysign(
+        1.0, bearing
+    )
+
+
+def _seen(layout, **quantities):
+    """An observation of these quantities; the others are the gait's on the left foot, or zero."""
+    values = dict.fromkeys(layout.names, 0.0)
+    state = ("heading", "stance_pitch", "ankle_angle", "stance_pitch_rate", "ankle_rate")
+    values |= dict(zip(state, gait_of(WalkerParameters()), strict=True)) | quantities
+    rows = zip(layout.names, layout.centres, layout.scales, strict=True)
+    return np.array([(values[name] - c) / s for name, c, s in rows], dtype=np.float32)
+
+
+def test_the_registry_makes_them_by_one_name():
+    for task, agent in AGENTS_BY_TASK.items():
+        made = make_agent("lqr", AgentRequest(f"LeanYaw/{task}-v0", EnvOptions()))
+        assert type(made) is type(agent)
+
+
+def test_bad_numbers_tasks_and_slopes_are_refused_by_name():
+    with pytest.raises(ValueError, match=r"heading must be in \(0, inf\], not 0"):
+        LqrWeights(heading=0.0)
+    with pytest.raises(ValueError, match=r"offset_change must be in \(0, inf\), not inf"):
+        LqrWeights(offset_change=math.inf)
+    with pytest.raises(ValueError, match="inter_leg_angle must be in"):
+        LqrSettings(inter_leg_angle=0.6)
+    with pytest.raises(ValueError, match="largest_error must be in"):
+        LqrSettings(largest_error=0.0)
+    with pytest.raises(ValueError, match="ahead must be in"):
+        PathSettings(ahead=9.0)
+    with pytest.raises(ValueError, match="radius must be in"):
+        WaypointSettings(radius=-1.0)
+    with pytest.raises(ValueError, match="task must show heading_error"):
+        HeadingLqr("Walk")
+    with pytest.raises(ValueError, match="task must show cross_track_error"):
+        PathGuidance("Heading")
+    with pytest.raises(ValueError, match="task must show goal_bearing"):
+        WaypointGuidance("Heading")
+    with pytest.raises(ValueError, match="slope must be above 0"):
+        guided("Level", EnvOptions())
