@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.agent import State
 from agents.observations import ObservationLayout
-from agents.regulator import ANGLES, GainSchedule, LqrWeights
+from agents.regulator import ANGLES, LqrWeights, schedule_of
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, MIRROR, STATE_FIELDS, Vector
@@ -69,7 +69,7 @@ class LqrLoop:
                 f"slope must be above 0 for a gait to regulate about, not {parameters.slope!r} (task {task})"
             )
         self.layout = ObservationLayout.of(task, options)
-        self.schedule = GainSchedule(parameters, settings.weights)
+        self.schedule = schedule_of(parameters, settings.weights)
         self.settings = settings
         self._options = options
         change = options.max_offset_change

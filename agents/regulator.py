@@ -306,3 +306,15 @@ class GainSchedule:
         gain = periodic_gain(node.step, mirrored.step, weights)
         turn = last_turn(mirrored.step, weights)
         return np.concatenate([node.state, [node.mass_offset, node.speed], gain.ravel(), turn])
+
+
+@lru_cache(maxsize=16)
+def schedule_of(parameters: WalkerParameters, weights: LqrWeights) -> GainSchedule:
+    """The schedule of a walker and weights, made once.
+
+    Raises
+    ------
+    NoGaitError
+        As ``GainSchedule``.
+    """
+    return GainSchedule(parameters, weights)

@@ -191,7 +191,7 @@ def test_headings_are_reached_as_closely_as_by_tuned_feedback():
 
 def test_goals_are_reached_and_not_orbited():
     results = run_episodes(AGENTS_BY_TASK["Waypoint"], "Waypoint", episodes=48)
-    # measured over 128 episodes: 4.1 goals in 300 units of time, none without a goal; pure pursuit reaches 2.8
+    # measured over 48 tuning episodes: 4.8 goals in 300 units of time; pure pursuit reaches 2.8
     assert results.survived.mean() > 0.9
     assert results.metrics["goals"].mean() > 3.2
     assert results.metrics["goals"].min() >= 1.0
