@@ -25,6 +25,7 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 
 # Numba's type hints know neither its extension options nor what a dispatcher keeps
 _njit: Any = njit
+_overload: Any = overload
 
 inlined = _njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
 
@@ -52,7 +53,12 @@ def _without_owner_code(typing_context, array):
 _without_owner: Any = intrinsic(_without_owner_code)
 
 
-@overload(borrowed)
+def by_type(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorate what chooses, by the arguments' types, the formula that is compiled in a function's place."""
+    return _overload(function, jit_options={"forceinline": True, **_OPTIONS})
+
+
+@by_type(borrowed)
 def _borrowed(array):
     return lambda array: _without_owner(array)
 

@@ -5,10 +5,12 @@ bounded, so polynomials without range reduction serve; complex arguments carry d
 """
 
 from math import pi
+from typing import Any
 
 import numpy as np
+from numba.core import types
 
-from lean_yaw_env.kernel.compilation import inlined
+from lean_yaw_env.kernel.compilation import by_type, inlined
 
 _TURN = 2.0 * pi
 
@@ -58,10 +60,38 @@ def within_half_turn(angle):
     return angle - _TURN * np.floor(angle.real / _TURN + 0.5)
 
 
-@inlined
-def square_root(x):
-    """Square root of a number with positive real part."""
+def square_root(x: Any) -> Any:
+    """Square root of a number with positive real part; of a complex one to first order in its imaginary part, which is all of a derivative."""
     return np.sqrt(x)
+
+
+@by_type(square_root)
+def _square_root(x):
+    if not isinstance(x, types.Complex):
+        return lambda x: np.sqrt(x)
+
+    def with_derivative(x):
+        root = np.sqrt(x.real)
+        return complex(root, 0.5 * x.imag / root)
+
+    return with_derivative
+
+
+def quotient(x: Any, y: Any) -> Any:
+    """x / y; of complex numbers to first order in their imaginary parts: complex division branches, and a branch stops vectorisation."""
+    return x / y
+
+
+@by_type(quotient)
+def _quotient(x, y):
+    if not (isinstance(x, types.Complex) or isinstance(y, types.Complex)):
+        return lambda x, y: x / y
+
+    def with_derivative(x, y):
+        ratio = x.real / y.real
+        return complex(ratio, (x.imag - ratio * y.imag) / y.real)
+
+    return with_derivative
 
 
 @inlined
@@ -69,10 +99,10 @@ def angle_of(sine, cosine):
     """The angle in (-pi, pi) of a point on the unit circle, to round-off, as analytic function of both coordinates."""
     # a quarter of the angle has its tangent in (-1, 1)
     cosine_half = square_root(0.5 * (1.0 + cosine))
-    sine_half = 0.5 * sine / cosine_half
-    t = sine_half / (1.0 + cosine_half)
+    sine_half = quotient(0.5 * sine, cosine_half)
+    t = quotient(sine_half, 1.0 + cosine_half)
     z = t * t
     seed = 4.0 * t * (_T0 + z * (_T1 + z * (_T2 + z * (_T3 + z * _T4))))
     seed_sine, seed_cosine = sine_cosine(seed)
     s = sine * seed_cosine - cosine * seed_sine  # the sine of what the seed lacks
-    return seed + s * (1.0 + s * s / 6.0)
+    return seed + s * (1.0 + quotient(s * s, 6.0))

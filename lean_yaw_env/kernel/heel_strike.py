@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lean_yaw_env.kernel.compilation import inlined
-from lean_yaw_env.kernel.elementary import angle_of
+from lean_yaw_env.kernel.elementary import angle_of, quotient
 from lean_yaw_env.kernel.stance import kinetic_energy, mass_matrix, middle_of_masses
 from lean_yaw_env.kernel.swing import swing_axis
 
@@ -13,10 +13,10 @@ def landing_pose(stance, sin_a, cos_a, sin_twist, cos_twist):
     """The swing foot flat on the floor: heading change, pitch and twist, and the sines and cosines the impact needs."""
     y, e, s = swing_axis(stance, sin_a, cos_a, sin_twist, cos_twist)
     axis_x = stance.cos_inter_leg * sin_a + stance.sin_inter_leg * cos_twist * cos_a
-    sin_heading = stance.sin_inter_leg * sin_twist / s
-    cos_heading = axis_x / s
-    new_sin_twist = sin_twist * sin_a / s
-    new_cos_twist = e / s
+    sin_heading = quotient(stance.sin_inter_leg * sin_twist, s)
+    cos_heading = quotient(axis_x, s)
+    new_sin_twist = quotient(sin_twist * sin_a, s)
+    new_cos_twist = quotient(e, s)
     heading_change = angle_of(sin_heading, cos_heading)
     new_pitch = angle_of(s, -y) - stance.tilt
     new_twist = angle_of(new_sin_twist, new_cos_twist)
@@ -95,7 +95,7 @@ def impact(
     )
     p1 = -u * v1 - w * va - h2 * new_sin_twist * na
     p2 = new_dq * v1 - new_q * v3 + h2 * (new_cos_twist * n1 - new_sin_twist * n3)
-    inverse = 1.0 / (m11 * m22 - m12 * m12)
+    inverse = quotient(1.0, m11 * m22 - m12 * m12)
     new_pitch_rate = (m22 * p1 - m12 * p2) * inverse
     new_twist_rate = (m11 * p2 - m12 * p1) * inverse
     after = kinetic_energy(m11, m12, m22, new_pitch_rate, new_twist_rate)

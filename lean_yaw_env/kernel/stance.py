@@ -10,7 +10,7 @@ The derivation is in docs/model.md.
 from __future__ import annotations
 
 from lean_yaw_env.kernel.compilation import inlined
-from lean_yaw_env.kernel.elementary import sine_cosine
+from lean_yaw_env.kernel.elementary import quotient, sine_cosine
 
 
 @inlined
@@ -118,7 +118,7 @@ def _balance(stance, time, pitch, twist, pitch_rate, twist_rate):
         - stance.ankle_stiffness * twist
         - stance.ankle_damping * twist_rate
     )
-    inverse = 1.0 / (m11 * m22 - m12 * m12)
+    inverse = quotient(1.0, m11 * m22 - m12 * m12)
     pitch_acceleration = (m22 * f1 - m12 * f2) * inverse
     twist_acceleration = (m11 * f2 - m12 * f1) * inverse
     return (
@@ -159,7 +159,7 @@ def accelerations_and_contact(stance, time, pitch, twist, pitch_rate, twist_rate
     dw, dv, normal, square = accelerations_and_forces(
         stance, time, pitch, twist, pitch_rate, twist_rate
     )
-    return dw, dv, normal, square / (normal * normal)
+    return dw, dv, normal, quotient(square, normal * normal)
 
 
 @inlined

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from lean_yaw_env.kernel.compilation import entry_point, inlined
-from lean_yaw_env.kernel.elementary import sine_cosine, within_half_turn
+from lean_yaw_env.kernel.elementary import quotient, sine_cosine, within_half_turn
 from lean_yaw_env.kernel.flight import (
     advance,
     first_step_length,
@@ -88,7 +88,7 @@ def start(stance, body, pitch, twist, pitch_rate, twist_rate):
     dw, dv, normal, square = accelerations_and_forces(
         stance, time, pitch, twist, pitch_rate, twist_rate
     )
-    friction = square / (normal * normal)
+    friction = quotient(square, normal * normal)
     gap, gap_rate, gap_acceleration, upright = foot_gap(
         stance, sin_a, cos_a, sin_twist, cos_twist, pitch_rate, twist_rate, dw, dv
     )
@@ -159,10 +159,10 @@ def touch_down(stance, flight):
         sin_a, cos_a = sine_cosine(x + stance.tilt)
         sin_twist, cos_twist = sine_cosine(b)
         gap, gap_rate, _, _ = foot_gap(stance, sin_a, cos_a, sin_twist, cos_twist, w, v, dw, dv)
-        correction = -gap / gap_rate
+        correction = quotient(-gap, gap_rate)
         time = time + correction
-        x = x + correction * (w + correction * (0.5 * dw + correction * jerk_w / 6.0))
-        b = b + correction * (v + correction * (0.5 * dv + correction * jerk_v / 6.0))
+        x = x + correction * (w + correction * (0.5 * dw + quotient(correction * jerk_w, 6.0)))
+        b = b + correction * (v + correction * (0.5 * dv + quotient(correction * jerk_v, 6.0)))
         w = w + correction * (dw + 0.5 * correction * jerk_w)
         v = v + correction * (dv + 0.5 * correction * jerk_v)
         dw = dw + correction * jerk_w

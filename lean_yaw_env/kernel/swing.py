@@ -7,7 +7,7 @@ axle, its ankle axis makes the angle A' with the floor's normal, sin A' = S = sq
 from __future__ import annotations
 
 from lean_yaw_env.kernel.compilation import inlined
-from lean_yaw_env.kernel.elementary import square_root
+from lean_yaw_env.kernel.elementary import quotient, square_root
 
 # S is positive unless the swing leg's ankle axis is vertical, which no landing leg's is; this only keeps division defined.
 _LEAST_SQUARE = 1e-12
@@ -71,8 +71,8 @@ def gap_motion(
 
     pp = pitch_rate * pitch_rate
     tt = twist_rate * twist_rate
-    s_rate = -y * y_rate / s
-    s_acceleration = -(y_rate * y_rate + y * y_acceleration + s_rate * s_rate) / s
+    s_rate = quotient(-y * y_rate, s)
+    s_acceleration = quotient(-(y_rate * y_rate + y * y_acceleration + s_rate * s_rate), s)
     k_rate = k_b * twist_rate
     k_acceleration = k_bb * tt + k_b * twist_acceleration
 
