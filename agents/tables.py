@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict
 
+from rich import box
 from rich.table import Table
 
 from agents.evaluation import Row
@@ -36,9 +37,11 @@ def results_table(rows: Sequence[Row]) -> Table:
     first = rows[0]
     table = Table(
         title=f"{first.task}: means of {first.episodes} episodes not trained on, 95 % intervals",
-        show_lines=True,
+        box=box.SIMPLE_HEAD,
+        padding=(0, 0),
+        pad_edge=False,
     )
-    table.add_column("metric")
+    table.add_column("metric", min_width=16)  # five agents and it fit a terminal of 80 columns
     for agent in agents:
         table.add_column(agent, justify="right", no_wrap=True)
     for metric in metrics:
@@ -52,7 +55,7 @@ def results_table(rows: Sequence[Row]) -> Table:
 def _cell(row: Row) -> str:
     if math.isnan(row.mean):
         return "undefined"
-    return f"{_number(row.mean)}\n{_number(row.low)} to {_number(row.high)}"
+    return f"{_number(row.mean)}\n{_number(row.low)}–{_number(row.high)}"
 
 
 def _number(value: float) -> str:
