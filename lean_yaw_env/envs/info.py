@@ -81,7 +81,9 @@ class InfoTable:
             rows.append((Source.MEMORY, column, 0))
         self.names = tuple(names)
         self.sources = np.array(rows, dtype=np.int64)
-        self._template: dict[str, Any] = dict.fromkeys(("state", "footprint", *names, "fall"))
+        keys = ("state", "footprint", *names, "fall")
+        self._masks = tuple(f"_{key}" for key in keys)
+        self._template: dict[str, Any] = dict.fromkeys(keys)
 
     def fill(self, memory: Vector, outcomes: Vector) -> Vector:
         """A fresh array (numbers, walkers)."""
@@ -114,7 +116,7 @@ class InfoTable:
             **dict(zip(self.names, table[_FIRST_SCALAR:], strict=True)),
             "fall": falls,
         }
-        info.update({f"_{key}": mask for key in tuple(info)})
+        info.update(dict.fromkeys(self._masks, mask))
         return info
 
 
