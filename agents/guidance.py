@@ -130,7 +130,7 @@ class PathGuidance:
         )
         ahead = self._settings.ahead
         slope = np.where(powers > 0, powers * ahead ** np.maximum(powers - 1, 0), 0.0)
-        return slope @ np.linalg.inv(conditions)
+        return np.asarray(slope @ np.linalg.inv(conditions), dtype=float)
 
 
 def _waypoint_loop() -> LqrSettings:
