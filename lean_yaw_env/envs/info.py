@@ -14,6 +14,7 @@ from lean_yaw_env.envs.tasks import Task
 from lean_yaw_env.kernel.compilation import entry_point
 from lean_yaw_env.kernel.records import Outcome
 from lean_yaw_env.parameters import STATE_SIZE, Vector
+from lean_yaw_env.threads import share_out
 from lean_yaw_env.walker import FALL_OF_STATUS
 
 
@@ -85,10 +86,18 @@ class InfoTable:
         self._masks = tuple(f"_{key}" for key in keys)
         self._template: dict[str, Any] = dict.fromkeys(keys)
 
-    def fill(self, memory: Vector, outcomes: Vector) -> Vector:
+    def fill(self, memory: Vector, outcomes: Vector, threads: int = 1) -> Vector:
         """A fresh array (numbers, walkers)."""
-        table = np.empty((len(self.sources), len(memory)))
-        fill_info(table, memory, outcomes, self.sources)
+        n = len(memory)
+        table = np.empty((len(self.sources), n))
+        if threads == 1 or n < _WORTH_SHARING:
+            fill_info(table, memory, outcomes, self.sources, 0, n)
+        else:
+            share_out(
+                lambda first, last: fill_info(table, memory, outcomes, self.sources, first, last),
+                n,
+                threads,
+            )
         return table
 
     def one(self, table: Vector, status: float) -> dict[str, Any]:
@@ -121,15 +130,17 @@ class InfoTable:
 
 
 _STEPPED = 2.0
+# Copying a walker's numbers takes a fifth of its step's time: fewer walkers than these are copied while a helper wakes up.
+_WORTH_SHARING = 8192
 _MEMORY, _OUTCOME, _QUOTIENT = (int(s) for s in (Source.MEMORY, Source.OUTCOME, Source.QUOTIENT))
 
 
 @entry_point()
-def fill_info(table, memory, outcomes, sources):
-    """Fill ``table`` (numbers, walkers) from the rows that ``sources`` names."""
+def fill_info(table, memory, outcomes, sources, first, last):
+    """Fill ``table`` (numbers, walkers) from the rows that ``sources`` names, for walkers ``first`` to ``last`` - 1."""
     for k in range(sources.shape[0]):
         kind, a, b = sources[k, 0], sources[k, 1], sources[k, 2]
-        for i in range(memory.shape[0]):
+        for i in range(first, last):
             if kind == _MEMORY:
                 table[k, i] = memory[i, a]
             elif kind == _OUTCOME:

@@ -205,7 +205,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
 
     def _infos(self, mask: NDArray[np.bool_]) -> dict[str, Any]:
         rows = self.rows
-        table = rows.info.fill(rows.memory, rows.outcomes)
+        table = rows.info.fill(rows.memory, rows.outcomes, self.threads)
         return rows.info.many(table, rows.outcomes[:, c.OUTCOME_STATUS], mask)
 
     def _walk(self) -> None:
