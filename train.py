@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from agents.reporting import show
-from agents.training import resumed_run, run, started_run
+from agents.evaluation.reporting import show
+from agents.learning.training import resumed_run, run, started_run
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 

@@ -4,11 +4,11 @@
 """
 
 from agents.agent import Agent
-from agents.controllers import FixedController, RandomController
-from agents.heading_feedback import HeadingFeedback, HeadingGains
-from agents.policy import Policy, PolicyCard
+from agents.controllers.heading_feedback import HeadingFeedback, HeadingGains
+from agents.controllers.simple import FixedController, RandomController
+from agents.policies.policy import Policy, PolicyCard
+from agents.policies.storage import PolicyFileError, load, save
 from agents.registry import AGENTS, AgentRequest, make_agent
-from agents.storage import PolicyFileError, load, save
 
 __all__ = [
     "AGENTS",

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from agents.reporting import evaluate_named, show
+from agents.evaluation.reporting import evaluate_named, show
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 

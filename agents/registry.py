@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from agents.agent import Agent
-from agents.controllers import FixedController, RandomController
+from agents.controllers.guidance import guided
+from agents.controllers.heading_feedback import HeadingFeedback
+from agents.controllers.simple import FixedController, RandomController
 from agents.files import read_json
-from agents.guidance import guided
-from agents.heading_feedback import HeadingFeedback
-from agents.storage import CARD_FILE, load, task_of
+from agents.policies.storage import CARD_FILE, load, task_of
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.registration import ENV_IDS
 

@@ -15,7 +15,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecEnv
 
-from agents.ppo_settings import PPOSettings, settings_for
+from agents.learning.ppo_settings import PPOSettings, settings_for
 from benchmarks.bars import Figure, command_line
 from benchmarks.environments import HEADING, kernel_alone
 from benchmarks.measure import SMALLEST, Effort, measure

@@ -11,17 +11,23 @@ from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_lyapunov
 
 from agents import AgentRequest, HeadingFeedback, make_agent
-from agents.evaluation import run_episodes
-from agents.guidance import (
+from agents.controllers.guidance import (
     PathGuidance,
     PathSettings,
     WaypointGuidance,
     WaypointSettings,
     guided,
 )
-from agents.lqr import HeadingLqr, LqrSettings
+from agents.controllers.lqr import HeadingLqr, LqrSettings
+from agents.controllers.regulator import (
+    GainSchedule,
+    LqrWeights,
+    last_turn,
+    linearise_step,
+    periodic_gain,
+)
+from agents.evaluation.scoring import run_episodes
 from agents.observations import ObservationLayout
-from agents.regulator import GainSchedule, LqrWeights, last_turn, linearise_step, periodic_gain
 from lean_yaw_env import Walker, WalkerParameters
 from lean_yaw_env.analysis.fixed_point import solve_fixed_point
 from lean_yaw_env.analysis.limit_cycle import cycle_at, find_gait

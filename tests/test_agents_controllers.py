@@ -18,7 +18,7 @@ from agents import (
     RandomController,
     make_agent,
 )
-from agents.evaluation import run_episodes
+from agents.evaluation.scoring import run_episodes
 from agents.observations import ObservationLayout
 from lean_yaw_env.envs.options import EnvOptions, gait_of
 from lean_yaw_env.parameters import MIRROR, WalkerParameters

@@ -9,9 +9,16 @@ import pytest
 from scipy import stats
 from typer.testing import CliRunner
 
-from agents import FixedController, HeadingFeedback, RandomController, evaluation
+from agents import FixedController, HeadingFeedback, RandomController
 from agents.evaluate import app
-from agents.evaluation import evaluate, mean_interval, run_episodes, summary, survival_interval
+from agents.evaluation.scoring import (
+    evaluate,
+    mean_interval,
+    run_episodes,
+    summary,
+    survival_interval,
+)
+from agents.evaluation.tables import results_table, rows_to_json
 from agents.seeds import (
     EVALUATION_SEEDS,
     MOST_EPISODES,
@@ -21,7 +28,6 @@ from agents.seeds import (
     evaluation_seed,
     training_seed,
 )
-from agents.tables import results_table, rows_to_json
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.walker_env import WalkerEnv
 
@@ -56,7 +62,7 @@ def test_an_evaluated_episode_is_the_single_environment_s():
 
 def test_episodes_do_not_depend_on_how_many_are_walked_together(monkeypatch):
     whole = run_episodes(FixedController(), "Heading", episodes=5, options=SHORT)
-    monkeypatch.setattr(evaluation, "_CHUNK", 2)
+    monkeypatch.setattr(scoring, "_CHUNK", 2)
     parts = run_episodes(FixedController(), "Heading", episodes=5, options=SHORT)
     for name, values in whole.metrics.items():
         assert np.array_equal(values, parts.metrics[name], equal_nan=True)

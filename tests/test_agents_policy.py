@@ -12,11 +12,11 @@ import safetensors.numpy
 import torch
 
 import agents
-from agents import storage
+from agents.learning.ppo import train_ppo
+from agents.learning.ppo_settings import PPOSettings
 from agents.observations import ObservationLayout
-from agents.policy import Policy, PolicyCard
-from agents.ppo import train_ppo
-from agents.ppo_settings import PPOSettings
+from agents.policies import storage
+from agents.policies.policy import Policy, PolicyCard
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.parameters import WalkerParameters
 

@@ -12,13 +12,14 @@ from gymnasium import spaces
 from typer.testing import CliRunner
 
 import train
-from agents import load, ppo
-from agents.checkpoint import CheckpointError, read_checkpoint, write_checkpoint
+from agents import load
 from agents.evaluate import app as evaluate_app
-from agents.ppo import train_ppo
-from agents.ppo_settings import SETTINGS, PPOSettings, settings_for
-from agents.rollouts import TimeDiscountedBuffer
-from agents.training import Training, new_run, read_run, resumed_run, run, started_run
+from agents.learning import ppo
+from agents.learning.checkpoint import CheckpointError, read_checkpoint, write_checkpoint
+from agents.learning.ppo import train_ppo
+from agents.learning.ppo_settings import SETTINGS, PPOSettings, settings_for
+from agents.learning.rollouts import TimeDiscountedBuffer
+from agents.learning.training import Training, new_run, read_run, resumed_run, run, started_run
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.registration import ENV_IDS
 

@@ -17,13 +17,19 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 from tqdm import tqdm
 
-from agents.checkpoint import CheckpointError, capture, read_checkpoint, restore, write_checkpoint
+from agents.learning.checkpoint import (
+    CheckpointError,
+    capture,
+    read_checkpoint,
+    restore,
+    write_checkpoint,
+)
+from agents.learning.ppo_settings import PPOSettings
+from agents.learning.rollouts import TimeDiscountedBuffer
 from agents.observations import ObservationLayout
-from agents.policy import NORMALISATION_FLOOR, NORMALISED_LIMIT, Policy, PolicyCard
-from agents.ppo_settings import PPOSettings
-from agents.rollouts import TimeDiscountedBuffer
+from agents.policies.policy import NORMALISATION_FLOOR, NORMALISED_LIMIT, Policy, PolicyCard
+from agents.policies.storage import task_of
 from agents.seeds import training_seed
-from agents.storage import task_of
 from agents.versions import package_versions
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.sb3 import WalkerVecEnv

@@ -11,17 +11,17 @@ from pathlib import Path
 from typing import Any
 
 from agents.agent import Agent
-from agents.evaluation import Row, evaluate
+from agents.evaluation.pictures import save_agents_footprints, save_learning_curve
+from agents.evaluation.reporting import progress_bar
+from agents.evaluation.scoring import Row, evaluate
+from agents.evaluation.tables import rows_to_plain
 from agents.files import read_json, write_json
-from agents.pictures import save_agents_footprints, save_learning_curve
-from agents.policy import Policy
-from agents.ppo import TrainingLog, train_ppo
-from agents.ppo_settings import PPOSettings, settings_for
+from agents.learning.ppo import TrainingLog, train_ppo
+from agents.learning.ppo_settings import PPOSettings, settings_for
+from agents.policies.policy import Policy
+from agents.policies.storage import CARD_FILE, options_from_plain, options_to_plain, save, task_of
 from agents.registry import AgentRequest, env_id_of, make_all
-from agents.reporting import progress_bar
 from agents.seeds import MOST_EPISODES, evaluation_seed, training_seed
-from agents.storage import CARD_FILE, options_from_plain, options_to_plain, save, task_of
-from agents.tables import rows_to_plain
 from agents.versions import package_versions
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.parameters import require_number

@@ -12,7 +12,7 @@ from safetensors import SafetensorError
 
 from agents.files import read_json, write_json
 from agents.observations import ObservationLayout
-from agents.policy import Policy, PolicyCard
+from agents.policies.policy import Policy, PolicyCard
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.registration import ENV_IDS, NAMESPACE
@@ -22,7 +22,7 @@ CARD_FILE = "policy.json"
 WEIGHTS_FILE = "policy.safetensors"
 FORMAT = "lean-yaw-policy"
 FORMAT_VERSION = 1
-SHIPPED = Path(__file__).parent / "trained"
+SHIPPED = Path(__file__).parents[1] / "trained"
 """Agents that come with the package, as ``<Task>-v<version>/seed<k>/``."""
 
 _KEYS: dict[str, type] = {

@@ -8,9 +8,9 @@ from pathlib import Path
 from rich.console import Console
 from tqdm import tqdm
 
-from agents.evaluation import Row, evaluate
+from agents.evaluation.scoring import Row, evaluate
+from agents.evaluation.tables import results_table, rows_to_json
 from agents.registry import AgentRequest, env_id_of, make_agent, make_all
-from agents.tables import results_table, rows_to_json
 from lean_yaw_env.envs.options import EnvOptions
 
 

@@ -21,7 +21,7 @@ _ANKLE_RATE = [field.name for field in STATE_FIELDS].index("ankle_rate")
 
 @dataclass(frozen=True)
 class HeadingGains:
-    """Gains of ``HeadingFeedback``; the defaults are what ``python -m agents.tune_feedback`` found.
+    """Gains of ``HeadingFeedback``; the defaults are what ``python -m agents.controllers.tune_feedback`` found.
 
     Attributes
     ----------

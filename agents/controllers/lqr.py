@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.agent import State
+from agents.controllers.regulator import ANGLES, LqrWeights, schedule_of
 from agents.observations import ObservationLayout
-from agents.regulator import ANGLES, LqrWeights, schedule_of
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, MIRROR, STATE_FIELDS, Vector

@@ -1,6 +1,6 @@
 """How the gains of ``HeadingFeedback`` were found: differential evolution on the mean return over episodes kept for tuning.
 
-Run as ``python -m agents.tune_feedback``; it prints the gains (some minutes).
+Run as ``python -m agents.controllers.tune_feedback``; it prints the gains (some minutes).
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import numpy as np
 from scipy.optimize import differential_evolution
 from tqdm import tqdm
 
-from agents.evaluation import Episodes, run_seeds
-from agents.heading_feedback import HeadingFeedback, HeadingGains
+from agents.controllers.heading_feedback import HeadingFeedback, HeadingGains
+from agents.evaluation.scoring import Episodes, run_seeds
 from agents.seeds import TUNING_SEEDS
 from lean_yaw_env.parameters import Vector
 

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from rich import box
 from rich.table import Table
 
-from agents.evaluation import Row
+from agents.evaluation.scoring import Row
 
 
 def rows_to_plain(rows: Sequence[Row]) -> list[dict[str, str | int | float | None]]:

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.agent import State
-from agents.lqr import HeadingLqr, LqrLoop, LqrSettings
+from agents.controllers.lqr import HeadingLqr, LqrLoop, LqrSettings
+from agents.controllers.regulator import LqrWeights
 from agents.observations import ObservationLayout
-from agents.regulator import LqrWeights
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.parameters import Vector
 

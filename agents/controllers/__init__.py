@@ -1,0 +1,1 @@
+"""Controllers that are designed rather than trained."""

@@ -1,0 +1,1 @@
+"""Judging agents: episodes, means with intervals, tables and pictures."""

@@ -1,0 +1,1 @@
+"""Trained policies: inference and files."""
