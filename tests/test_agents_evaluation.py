@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from agents import FixedController, HeadingFeedback, RandomController
 from agents.evaluate import app
+from agents.evaluation import scoring
 from agents.evaluation.scoring import (
     evaluate,
     mean_interval,
