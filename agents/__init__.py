@@ -7,7 +7,7 @@ from agents.agent import Agent
 from agents.controllers.heading_feedback import HeadingFeedback, HeadingGains
 from agents.controllers.simple import FixedController, RandomController
 from agents.policies.policy import Policy, PolicyCard
-from agents.policies.storage import PolicyFileError, load, save
+from agents.policies.storage import PolicyFileError, load, save, shipped_seeds
 from agents.registry import AGENTS, AgentRequest, make_agent
 
 __all__ = [
@@ -24,4 +24,5 @@ __all__ = [
     "load",
     "make_agent",
     "save",
+    "shipped_seeds",
 ]

@@ -11,7 +11,7 @@ from agents.controllers.guidance import guided
 from agents.controllers.heading_feedback import HeadingFeedback
 from agents.controllers.simple import FixedController, RandomController
 from agents.files import read_json
-from agents.policies.storage import CARD_FILE, load, task_of
+from agents.policies.storage import CARD_FILE, DEFAULT_ALGORITHM, load, task_of
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.registration import ENV_IDS
 
@@ -40,17 +40,22 @@ def _feedback(request: AgentRequest) -> Agent:
     return HeadingFeedback(task_of(request.env_id), request.options)
 
 
-def _ppo(request: AgentRequest) -> Agent:
-    folder = request.path or newest_policy(request.env_id, request.runs)
-    source = request.env_id if folder is None else folder
-    return load(source, env_id=request.env_id)
+def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
+    """Makes an algorithm's trained policy: of the folder asked for, the newest run or the package."""
+
+    def made(request: AgentRequest) -> Agent:
+        folder = request.path or newest_policy(request.env_id, request.runs, algorithm)
+        source = request.env_id if folder is None else folder
+        return load(source, env_id=request.env_id, algorithm=algorithm)
+
+    return made
 
 
 AGENTS: dict[str, Callable[[AgentRequest], Agent]] = {
     "random": lambda request: RandomController(request.seed),
     "fixed": lambda request: FixedController(),
     "feedback": _feedback,
-    "ppo": _ppo,
+    "ppo": _trained("ppo"),
     "lqr": lambda request: guided(task_of(request.env_id), request.options),
 }
 """Every agent, in the order of tables."""
@@ -91,14 +96,15 @@ def env_id_of(task: str) -> str:
     raise ValueError(f"task must be one of {names}, not {task!r}")
 
 
-def newest_policy(env_id: str, runs: Path) -> Path | None:
-    """The folder of the policy for an environment that was written last under ``runs``, if there is any."""
+def newest_policy(env_id: str, runs: Path, algorithm: str = DEFAULT_ALGORITHM) -> Path | None:
+    """The folder of an algorithm's policy for an environment that was written last under ``runs``, if there is any."""
     found: list[tuple[float, Path]] = []
     for card in runs.glob(f"*/{CARD_FILE}"):
         try:
             values = read_json(card)
         except ValueError:
             continue
-        if isinstance(values, dict) and values.get("env_id") == env_id:
+        wanted = {"env_id": env_id, "algorithm": algorithm}
+        if isinstance(values, dict) and {key: values.get(key) for key in wanted} == wanted:
             found.append((card.stat().st_mtime, card.parent))
     return max(found)[1] if found else None

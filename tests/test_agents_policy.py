@@ -164,6 +164,7 @@ def test_another_observation_is_refused(folder):
         ({"surprise": 1}, "must hold format"),
         ({"seed": "0"}, "seed must be of type int"),
         ({"seed": True}, "seed must be of type int"),
+        ({"algorithm": "../x"}, "algorithm must be a lower-case word"),
         ({"activation": "eval"}, "activation must be one of tanh, relu"),
         ({"output": "eval"}, "output must be one of clip, tanh"),
         ({"options": {"made_up": 1}}, "options must hold"),
@@ -209,20 +210,33 @@ def test_weights_that_are_no_network_are_refused():
         Policy(card(), {})
 
 
-def test_agents_of_the_package_are_found_by_id_and_seed(tmp_path, monkeypatch):
+def test_agents_of_the_package_are_found_by_id_algorithm_and_seed(tmp_path, monkeypatch):
     monkeypatch.setattr(storage, "SHIPPED", tmp_path)
-    for seed in (3, 11):
-        agents.save(Policy(card(seed=seed), weights(seed)), tmp_path / "Heading-v0" / f"seed{seed}")
+    for algorithm, seed in [("ppo", 3), ("ppo", 11), ("sac", 2)]:
+        folder = storage.shipping_folder(ID, algorithm, seed)
+        agents.save(Policy(card(algorithm=algorithm, seed=seed), weights(seed)), folder)
+    assert (tmp_path / "Heading-v0" / "sac" / "seed2" / storage.CARD_FILE).exists()
+    assert agents.shipped_seeds(ID, "ppo") == [3, 11]
+    assert agents.shipped_seeds(ID, "sac") == [2]
+    assert agents.shipped_seeds("LeanYaw/Walk-v0", "ppo") == []
     assert agents.load(ID).card.seed == 3
     assert agents.load(ID, seed=11).card.seed == 11
-    with pytest.raises(
-        agents.PolicyFileError, match="no trained agent for LeanYaw/Heading-v0 with seed 5"
-    ):
-        agents.load(ID, seed=5)
-    with pytest.raises(agents.PolicyFileError, match="no trained agent for LeanYaw/Walk-v0"):
-        agents.load("LeanYaw/Walk-v0")
-    with pytest.raises(agents.PolicyFileError, match="not LeanYaw/Heading-v7"):
-        agents.load("LeanYaw/Heading-v7")
+    assert agents.load(ID, algorithm="sac").card.algorithm == "sac"
+    for id_, choices, message in [
+        (ID, {"seed": 5}, "no ppo agent for LeanYaw/Heading-v0 with seed 5"),
+        (ID, {"algorithm": "sac", "seed": 3}, "no sac agent for LeanYaw/Heading-v0 with seed 3"),
+        (ID, {"algorithm": "../ppo"}, "algorithm must be a lower-case word"),
+        ("LeanYaw/Walk-v0", {}, "no ppo agent for LeanYaw/Walk-v0"),
+        ("LeanYaw/Heading-v7", {}, "not LeanYaw/Heading-v7"),
+    ]:
+        with pytest.raises(agents.PolicyFileError, match=message):
+            agents.load(id_, **choices)
+
+
+def test_a_folder_s_policy_of_another_algorithm_is_refused(folder):
+    assert agents.load(folder, algorithm="ppo").card == card()
+    with pytest.raises(agents.PolicyFileError, match="trained by ppo, not by sac"):
+        agents.load(folder, algorithm="sac")
 
 
 def test_the_policy_taken_from_a_training_acts_as_the_trained_network(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +13,17 @@ from gymnasium import spaces
 from typer.testing import CliRunner
 
 import train
-from agents import load
+from agents import Policy, load, save
 from agents.evaluate import app as evaluate_app
+from agents.evaluation.tables import rows_to_plain
 from agents.learning import ppo
 from agents.learning.checkpoint import CheckpointError, read_checkpoint, write_checkpoint
 from agents.learning.ppo import train_ppo
 from agents.learning.ppo_settings import SETTINGS, PPOSettings, settings_for
 from agents.learning.rollouts import TimeDiscountedBuffer
+from agents.learning.ship import ship
 from agents.learning.training import Training, new_run, read_run, resumed_run, run, started_run
+from agents.policies import storage
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.registration import ENV_IDS
 
@@ -166,7 +170,8 @@ def test_a_checkpoint_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
 
 
 def tiny_training(**changes) -> Training:
-    return Training(ID, 0, TINY, SHORT, **{"episodes": 4, "checkpoint_seconds": 0.0} | changes)
+    values = {"seed": 0, "settings": TINY, "options": SHORT, "episodes": 4, "checkpoint_seconds": 0.0}  # fmt: skip
+    return Training(ID, **values | changes)
 
 
 def test_a_run_leaves_agent_statistics_settings_pictures_and_judgement(tmp_path):
@@ -190,6 +195,32 @@ def test_a_run_leaves_agent_statistics_settings_pictures_and_judgement(tmp_path)
     lines = (folder / "episodes.csv").read_text().splitlines()
     assert lines[0] == "steps,return,length,survived"
     assert len(lines) > TINY.walkers
+
+
+def test_finished_runs_are_shipped_and_loaded_by_id_and_others_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(storage, "SHIPPED", tmp_path / "trained")
+    folder = new_run(tiny_training(options=EnvOptions(), seed=3), tmp_path)
+    with pytest.raises(ValueError, match=r"no policy can be loaded"):
+        ship(folder)
+    result = run(folder, progress=False)
+    shipped = ship(folder)
+    assert shipped == tmp_path / "trained" / "Heading-v0" / "ppo" / "seed3"
+    names = ["evaluation.json", "policy.json", "policy.safetensors"]
+    assert sorted(path.name for path in shipped.iterdir()) == names
+    assert load(ID, seed=3).card == result.policy.card
+    rows = json.loads((shipped / "evaluation.json").read_text())
+    assert rows == rows_to_plain([row for row in result.rows if row.agent == "ppo"])
+    with pytest.raises(ValueError, match="replace it by --replace"):
+        ship(folder)
+    assert ship(folder, replace=True) == shipped
+    (folder / "evaluation.json").unlink()
+    with pytest.raises(ValueError, match="is not finished"):
+        ship(folder, replace=True)
+    other = new_run(tiny_training(), tmp_path)
+    (other / "evaluation.json").write_text("[]")
+    save(Policy(replace(result.policy.card, options=SHORT), result.policy.weights), other)
+    with pytest.raises(ValueError, match="must be the environment's own"):
+        ship(other)
 
 
 def test_finished_runs_are_not_resumed_and_unfinished_ones_are_found(tmp_path):

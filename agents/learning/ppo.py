@@ -143,10 +143,11 @@ def policy_of(
         env_id=env_id,
         options=options,
         layout=ObservationLayout.of(task_of(env_id), options),
+        algorithm="ppo",
         activation="tanh",
         output="clip",
         seed=seed,
-        settings={**asdict(settings), "hidden": list(settings.hidden), "algorithm": "PPO"},
+        settings={**asdict(settings), "hidden": list(settings.hidden)},
         training={"steps": int(model.num_timesteps), "seconds": round(log.seconds, 1)},
         versions=package_versions(),
     )

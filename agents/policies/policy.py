@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -33,6 +34,13 @@ NORMALISED_LIMIT = 10.0
 """Bound of a normalised observation, as there."""
 
 
+def require_algorithm(name: str) -> str:
+    """The name of an algorithm, which may be no path, or ``ValueError``."""
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
+        raise ValueError(f"algorithm must be a lower-case word, as ppo, not {name!r}")
+    return name
+
+
 @dataclass(frozen=True)
 class PolicyCard:
     """What a policy is and where it comes from; plain values only.
@@ -42,6 +50,7 @@ class PolicyCard:
     env_id : the environment it was trained for, with its version
     options : those of the environment
     layout : the observation it takes
+    algorithm : that trained it, as ``ppo``; a lower-case word, since it names the agent and its folder
     activation, output : names in ``ACTIVATIONS`` and ``OUTPUTS``
     seed : of its training
     settings : of its training
@@ -52,6 +61,7 @@ class PolicyCard:
     env_id: str
     options: EnvOptions
     layout: ObservationLayout
+    algorithm: str = "ppo"
     activation: str = "tanh"
     output: str = "clip"
     seed: int = 0
@@ -60,6 +70,7 @@ class PolicyCard:
     versions: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        require_algorithm(self.algorithm)
         if self.activation not in ACTIVATIONS:
             raise ValueError(
                 f"activation must be one of {', '.join(ACTIVATIONS)}, not {self.activation!r}"

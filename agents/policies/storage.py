@@ -12,7 +12,7 @@ from safetensors import SafetensorError
 
 from agents.files import read_json, write_json
 from agents.observations import ObservationLayout
-from agents.policies.policy import Policy, PolicyCard
+from agents.policies.policy import Policy, PolicyCard, require_algorithm
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.registration import ENV_IDS, NAMESPACE
@@ -23,7 +23,9 @@ WEIGHTS_FILE = "policy.safetensors"
 FORMAT = "lean-yaw-policy"
 FORMAT_VERSION = 1
 SHIPPED = Path(__file__).parents[1] / "trained"
-"""Agents that come with the package, as ``<Task>-v<version>/seed<k>/``."""
+"""Agents that come with the package, as ``<Task>-v<version>/<algorithm>/seed<k>/``."""
+DEFAULT_ALGORITHM = "ppo"
+"""Whose agent is meant where none is named."""
 
 _KEYS: dict[str, type] = {
     "format": str,
@@ -31,6 +33,7 @@ _KEYS: dict[str, type] = {
     "env_id": str,
     "options": dict,
     "observation": dict,
+    "algorithm": str,
     "activation": str,
     "output": str,
     "seed": int,
@@ -60,6 +63,7 @@ def save(policy: Policy, folder: Path) -> None:
             "env_id": card.env_id,
             "options": options_to_plain(card.options),
             "observation": asdict(card.layout),
+            "algorithm": card.algorithm,
             "activation": card.activation,
             "output": card.output,
             "seed": card.seed,
@@ -71,7 +75,13 @@ def save(policy: Policy, folder: Path) -> None:
     )
 
 
-def load(source: str | Path, *, env_id: str | None = None, seed: int | None = None) -> Policy:
+def load(
+    source: str | Path,
+    *,
+    env_id: str | None = None,
+    algorithm: str | None = None,
+    seed: int | None = None,
+) -> Policy:
     """Load a policy; reads numbers and names only and runs no code from the files.
 
     Parameters
@@ -79,19 +89,21 @@ def load(source: str | Path, *, env_id: str | None = None, seed: int | None = No
     source : an environment's id, for the agent that comes with the package, or a folder
     env_id : str, optional
         The environment that the policy is wanted for.
+    algorithm : str, optional
+        That trained the policy; of the package's agents PPO's otherwise, and of a folder's whatever it is.
     seed : int, optional
-        Which of the package's agents for that id; the lowest seed there is otherwise.
+        Which of the package's agents for that id and algorithm; the lowest seed there is otherwise.
 
     Raises
     ------
     PolicyFileError
-        If there is no policy, a file is damaged or not of this format, or it was trained for another environment, version or
-        observation.
+        If there is no policy, a file is damaged or not of this format, or it was trained for another environment or version, on
+        other observations or by another algorithm.
     """
     name = str(source)
     if name.startswith(f"{NAMESPACE}/"):
         require_env_id(name)
-        folder = shipped_folder(name, seed)
+        folder = shipped_folder(name, algorithm or DEFAULT_ALGORITHM, seed)
         env_id = name if env_id is None else env_id
     else:
         folder = Path(source)
@@ -101,6 +113,8 @@ def load(source: str | Path, *, env_id: str | None = None, seed: int | None = No
             raise ValueError(
                 f"the policy was trained for {card.env_id}, not for {env_id}; train one for it by train.py"
             )
+        if algorithm is not None and card.algorithm != algorithm:
+            raise ValueError(f"the policy was trained by {card.algorithm}, not by {algorithm}")
         return Policy(card, _read_weights(folder / WEIGHTS_FILE, digest))
     except PolicyFileError:
         raise
@@ -108,21 +122,43 @@ def load(source: str | Path, *, env_id: str | None = None, seed: int | None = No
         raise PolicyFileError(f"no policy can be loaded from {str(folder)!r}: {error}") from error
 
 
-def shipped_folder(env_id: str, seed: int | None = None) -> Path:
+def shipped_seeds(env_id: str, algorithm: str = DEFAULT_ALGORITHM) -> list[int]:
+    """The seeds, in order, of the agents that come with the package for an environment's id and an algorithm; empty for none."""
+    return [seed for seed, _ in _shipped(env_id, algorithm)]
+
+
+def shipped_folder(
+    env_id: str, algorithm: str = DEFAULT_ALGORITHM, seed: int | None = None
+) -> Path:
     """The folder of an agent that comes with the package, or ``PolicyFileError`` if there is none."""
-    home = SHIPPED / env_id.removeprefix(f"{NAMESPACE}/")
-    found = sorted(
-        (int(folder.name.removeprefix("seed")), folder)
-        for folder in home.glob("seed*")
-        if folder.name.removeprefix("seed").isdigit()
-    )
-    for number, folder in found:
+    for number, folder in _shipped(env_id, algorithm):
         if seed is None or number == seed:
             return folder
     wanted = "" if seed is None else f" with seed {seed}"
     raise PolicyFileError(
-        f"no trained agent for {env_id}{wanted} comes with this package; train one by train.py"
+        f"no {algorithm} agent for {env_id}{wanted} comes with this package; train one by train.py"
     )
+
+
+def shipping_folder(env_id: str, algorithm: str, seed: int) -> Path:
+    """Where an agent of the package is kept, whether it is there or not."""
+    return _shipped_home(env_id, algorithm) / f"seed{seed}"
+
+
+def _shipped(env_id: str, algorithm: str) -> list[tuple[int, Path]]:
+    """Seeds and folders of the package's agents."""
+    numbered = [
+        (folder.name.removeprefix("seed"), folder)
+        for folder in _shipped_home(env_id, algorithm).glob("seed*")
+    ]
+    return sorted((int(number), folder) for number, folder in numbered if number.isdecimal())
+
+
+def _shipped_home(env_id: str, algorithm: str) -> Path:
+    try:
+        return SHIPPED / env_id.removeprefix(f"{NAMESPACE}/") / require_algorithm(algorithm)
+    except ValueError as error:
+        raise PolicyFileError(str(error)) from error
 
 
 def require_env_id(env_id: str) -> str:
@@ -209,7 +245,7 @@ def _read_card(path: Path) -> tuple[PolicyCard, str]:
     return card, values["weights_sha256"]
 
 
-_CARD_VALUES = ("activation", "output", "seed", "settings", "training", "versions")
+_CARD_VALUES = ("algorithm", "activation", "output", "seed", "settings", "training", "versions")
 
 
 def _listed(values: dict[str, Any]) -> dict[str, Any]:
