@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal, get_args
 
 from agents.agent import Agent
 from agents.controllers.guidance import guided
 from agents.controllers.heading_feedback import HeadingFeedback
 from agents.controllers.simple import FixedController, RandomController
 from agents.files import read_json
-from agents.policies.storage import CARD_FILE, DEFAULT_ALGORITHM, load, task_of
+from agents.policies.storage import CARD_FILE, DEFAULT_ALGORITHM, load, shipped_seeds, task_of
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.registration import ENV_IDS
+from lean_yaw_env.errors import NoGaitError
+from lean_yaw_env.registration import ENV_IDS, TASK_VERSIONS
+
+Kind = Literal["baseline", "feedback", "planner", "learned"]
+"""What an agent rests on: nothing, a law from its observation, a search on the walker itself at every step, or a training."""
+KINDS: tuple[Kind, ...] = get_args(Kind)
+QUICK_KINDS: tuple[Kind, ...] = ("baseline", "feedback", "learned")
+"""Kinds that take next to no time to act."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +35,7 @@ class AgentRequest:
     seed : for agents that draw
     path : folder of a trained policy, for agents that are trained; the newest under ``runs``, or the package's own, otherwise
     runs : where trainings leave their folders
+    shipped : seed of the training whose policy of the package's own is wanted, whatever is under ``runs``
     """
 
     env_id: str
@@ -34,6 +43,23 @@ class AgentRequest:
     seed: int = 0
     path: Path | None = None
     runs: Path = Path("runs")
+    shipped: int | None = None
+
+
+@dataclass(frozen=True)
+class AgentEntry:
+    """An agent of the registry.
+
+    Attributes
+    ----------
+    kind : Kind
+    make : makes it for a request
+    tasks : names of those that it is for
+    """
+
+    kind: Kind
+    make: Callable[[AgentRequest], Agent]
+    tasks: tuple[str, ...] = tuple(TASK_VERSIONS)
 
 
 def _feedback(request: AgentRequest) -> Agent:
@@ -44,6 +70,8 @@ def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
     """Makes an algorithm's trained policy: of the folder asked for, the newest run or the package."""
 
     def made(request: AgentRequest) -> Agent:
+        if request.shipped is not None:
+            return load(request.env_id, algorithm=algorithm, seed=request.shipped)
         folder = request.path or newest_policy(request.env_id, request.runs, algorithm)
         source = request.env_id if folder is None else folder
         return load(source, env_id=request.env_id, algorithm=algorithm)
@@ -51,14 +79,25 @@ def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
     return made
 
 
-AGENTS: dict[str, Callable[[AgentRequest], Agent]] = {
-    "random": lambda request: RandomController(request.seed),
-    "fixed": lambda request: FixedController(),
-    "feedback": _feedback,
-    "ppo": _trained("ppo"),
-    "lqr": lambda request: guided(task_of(request.env_id), request.options),
+AGENTS: dict[str, AgentEntry] = {
+    "random": AgentEntry("baseline", lambda request: RandomController(request.seed)),
+    "fixed": AgentEntry("baseline", lambda request: FixedController()),
+    "feedback": AgentEntry("feedback", _feedback, ("Heading", "SpeedHeading", "UTurn", "Level")),
+    "lqr": AgentEntry(
+        "feedback",
+        lambda request: guided(task_of(request.env_id), request.options),
+        ("Heading", "SpeedHeading", "Waypoint", "Slalom", "UTurn"),
+    ),
+    "ppo": AgentEntry("learned", _trained("ppo")),
 }
-"""Every agent, in the order of tables."""
+"""Every agent, in the order of tables; a learned one has the name of its algorithm."""
+
+
+def agent_entry(name: str) -> AgentEntry:
+    """The entry of that name, or ``ValueError`` naming those there are."""
+    if name not in AGENTS:
+        raise ValueError(f"agents must be among {', '.join(AGENTS)}, not {name!r}")
+    return AGENTS[name]
 
 
 def make_agent(name: str, request: AgentRequest) -> Agent:
@@ -70,21 +109,43 @@ def make_agent(name: str, request: AgentRequest) -> Agent:
         If there is no such agent, or it is not one for this task.
     PolicyFileError
         If a trained one is not found or cannot be loaded.
+    NoGaitError
+        If it needs a gait that the walker of these options does not have.
     """
-    if name not in AGENTS:
-        raise ValueError(f"agents must be among {', '.join(AGENTS)}, not {name!r}")
-    return AGENTS[name](request)
+    entry = agent_entry(name)
+    task = task_of(request.env_id)
+    if task not in entry.tasks:
+        raise ValueError(f"{name} is an agent for {', '.join(entry.tasks)}, not for {task!r}")
+    return entry.make(request)
 
 
-def make_all(request: AgentRequest) -> dict[str, Agent]:
-    """Every agent that there is for this task; those that need a training which is not found are left out."""
+def names_for(request: AgentRequest, kinds: Collection[Kind] = KINDS) -> tuple[str, ...]:
+    """Names of the agents of some kinds that are for this task; of the learned, those that a training is found of."""
+    task = task_of(request.env_id)
+    return tuple(
+        name
+        for name, entry in AGENTS.items()
+        if entry.kind in kinds
+        and task in entry.tasks
+        and (entry.kind != "learned" or _is_trained(name, request))
+    )
+
+
+def make_all(request: AgentRequest, kinds: Collection[Kind] = QUICK_KINDS) -> dict[str, Agent]:
+    """Every agent of some kinds that there is for this task, as ``names_for``, but for those that need a gait the walker does not have."""
     agents: dict[str, Agent] = {}
-    for name in AGENTS:
+    for name in names_for(request, kinds):
         try:
             agents[name] = make_agent(name, request)
-        except ValueError:
+        except NoGaitError:
             continue
     return agents
+
+
+def _is_trained(algorithm: str, request: AgentRequest) -> bool:
+    if request.path is not None or shipped_seeds(request.env_id, algorithm):
+        return True
+    return newest_policy(request.env_id, request.runs, algorithm) is not None
 
 
 def env_id_of(task: str) -> str:

@@ -214,7 +214,7 @@ def _is_finished(folder: Path) -> bool:
 def _judged_agents(training: Training, policy: Policy) -> dict[str, Agent]:
     """The trained policy beside the agents that need no training and know the task."""
     request = AgentRequest(training.env_id, training.options, seed=training.seed)
-    return make_all(request) | {policy.card.algorithm: policy}
+    return make_all(request, ("baseline", "feedback")) | {policy.card.algorithm: policy}
 
 
 def _judge(training: Training, agents: Mapping[str, Agent], progress: bool) -> list[Row]:
