@@ -21,6 +21,8 @@ _TINY = 1e-30
 # Inputs in the order of the columns: the section state, then inter-leg angle, mass offset and the offset before.
 INPUTS = 8
 STATE_SIZE = 5
+# Outputs in the order of the rows: the section state, then what else a step is judged by.
+OUTPUTS = ("heading", "stance_pitch", "ankle_angle", "stance_pitch_rate", "ankle_rate", "duration", "displacement_x", "displacement_z", "offset", "shift_work")  # fmt: skip
 _ROWS = len(Flight._fields)
 _IMAGINARY = _ROWS * INPUTS  # where the imaginary parts begin
 _STATUS = Flight._fields.index("status") * INPUTS
@@ -146,7 +148,7 @@ def _fly(work, body, command, heading, side):
 
 @inlined
 def _end(work, body, command, heading, side):
-    """Put the outcomes in the place of the flights: status, then the section state."""
+    """Put the outcomes in the place of the flights: status, then ``OUTPUTS``."""
     for lane in range(INPUTS):
         stance = _stance(body, command, heading, side, lane)
         outcome = finish(stance, _seeded(heading, lane, 0), _load(work, lane))
@@ -156,20 +158,28 @@ def _end(work, body, command, heading, side):
         _keep(work, 3, lane, outcome.ankle_angle)
         _keep(work, 4, lane, outcome.stance_pitch_rate)
         _keep(work, 5, lane, outcome.ankle_rate)
+        _keep(work, 6, lane, outcome.duration)
+        _keep(work, 7, lane, outcome.displacement_x)
+        _keep(work, 8, lane, outcome.displacement_z)
+        _keep(work, 9, lane, outcome.offset)
+        _keep(work, 10, lane, outcome.shift_work)
 
 
 @entry_point()
 def step_jacobian(
     body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side, state, jacobian
 ):
-    """Write the next section state (5,) and its derivatives (5, 8) by state and command; return how the step ended."""
+    """Write the next section state (5,) and the derivatives (k, 8) of the first k of ``OUTPUTS`` by state and command; return how the
+    step ended.
+    """
     work = np.zeros(2 * _IMAGINARY)
     _begin(work, body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side)
     _fly(work, body, command, heading, side)
     _end(work, body, command, heading, side)
     for k in range(STATE_SIZE):
+        state[k] = work[(k + 1) * INPUTS]
+    for k in range(jacobian.shape[0]):
         place = (k + 1) * INPUTS
-        state[k] = work[place]
         for lane in range(INPUTS):
             jacobian[k, lane] = work[_IMAGINARY + place + lane] / _TINY
     return work[0]

@@ -11,11 +11,11 @@ from lean_yaw_env.kernel.records import Body, Command
 def step_jacobians(bodies, commands, states, sides, statuses, afters, jacobians, first, last):
     """``step_jacobian`` of walkers ``first`` to ``last`` - 1.
 
-    ``bodies`` (n, 11), ``commands`` (n, 3), ``states`` (n, 5), ``sides`` (n,); written: ``statuses``
-    (n,), ``afters`` (n, 5), ``jacobians`` (n, 5, 8).
+    ``bodies`` (1 or n, 11), ``commands`` (n, 3), ``states`` (n, 5), ``sides`` (n,); written: ``statuses``
+    (n,), ``afters`` (n, 5), ``jacobians`` (n, k, 8) of the first k outputs.
     """
     for i in range(first, last):
-        p, c, s = bodies[i], commands[i], states[i]
+        p, c, s = bodies[i if bodies.shape[0] > 1 else 0], commands[i], states[i]
         statuses[i] = step_jacobian(
             Body(p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10]),
             Command(c[0], c[1], c[2]),
