@@ -16,7 +16,7 @@ import train
 from agents import Policy, load, save
 from agents.evaluate import app as evaluate_app
 from agents.evaluation.tables import rows_to_plain
-from agents.learning import ppo
+from agents.learning import keeper
 from agents.learning.checkpoint import CheckpointError, read_checkpoint, write_checkpoint
 from agents.learning.ppo import train_ppo
 from agents.learning.ppo_settings import SETTINGS, PPOSettings, settings_for
@@ -87,17 +87,17 @@ def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, monkeypatch):
     whole = train_ppo(ID, TINY, seed=3, options=SHORT, progress=False)
     checkpoint = tmp_path / "checkpoint.safetensors"
     arguments = {"seed": 3, "options": SHORT, "checkpoint": checkpoint, "checkpoint_seconds": 0.0, "progress": False}  # fmt: skip
-    original = ppo._Keeper._on_step
+    original = keeper.Keeper._on_step
 
-    def interrupted(keeper) -> bool:
-        if keeper.num_timesteps > 800:  # in the midst of collecting experience
+    def interrupted(self) -> bool:
+        if self.num_timesteps > 800:  # in the midst of collecting experience
             raise Interruption
-        return original(keeper)
+        return original(self)
 
-    monkeypatch.setattr(ppo._Keeper, "_on_step", interrupted)
+    monkeypatch.setattr(keeper.Keeper, "_on_step", interrupted)
     with pytest.raises(Interruption):
         train_ppo(ID, TINY, **arguments)
-    monkeypatch.setattr(ppo._Keeper, "_on_step", original)
+    monkeypatch.setattr(keeper.Keeper, "_on_step", original)
     assert int(read_checkpoint(checkpoint)["count.steps"]) == 768  # the last update before
     np.random.seed(99)  # noqa: NPY002 - the resumed training must not depend on it
     torch.manual_seed(99)

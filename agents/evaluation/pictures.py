@@ -12,7 +12,7 @@ from matplotlib.ticker import EngFormatter, MaxNLocator
 from agents.agent import Agent
 from agents.evaluation.recording import record_episode
 from agents.evaluation.scoring import Row
-from agents.learning.ppo import TrainingLog
+from agents.learning.results import TrainingLog
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import Vector

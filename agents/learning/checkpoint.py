@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +12,9 @@ import safetensors.numpy
 import torch
 from numpy.typing import NDArray
 from safetensors import SafetensorError
-from stable_baselines3 import PPO
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
+from torch.optim import Optimizer
 
 from lean_yaw_env.envs.sb3 import WalkerVecEnv
 from lean_yaw_env.rendering.files import written_whole
@@ -38,20 +41,27 @@ def read_checkpoint(path: Path) -> Arrays:
         raise CheckpointError(f"no checkpoint can be read from {str(path)!r}: {error}") from error
 
 
-def capture(model: PPO) -> Arrays:
-    """All that decides how a training goes on, between two updates: networks, optimiser, statistics, walkers, random numbers."""
+def capture(model: BaseAlgorithm, optimizers: Mapping[str, Optimizer]) -> Arrays:
+    """All that decides how a training goes on, between two updates: networks, optimisers, statistics, walkers, random numbers.
+
+    Parameters
+    ----------
+    model : trains on a ``WalkerVecEnv`` within a ``VecNormalize``
+    optimizers : of the model, by the names that they are kept under
+    """
     normaliser, walkers = _environment(model)
     arrays: Arrays = {
         "count.steps": np.array(model.num_timesteps),
         "count.updates": np.array(model._n_updates),
-        "last.observations": np.asarray(model._last_obs),
-        "last.starts": np.asarray(model._last_episode_starts),
+        "last.observations": np.array(model._last_obs),
+        "last.starts": np.array(model._last_episode_starts),
         "normaliser.returns": normaliser.returns,
         "random.torch": torch.get_rng_state().numpy(),
     }
     arrays |= {f"policy.{k}": v.detach().cpu().numpy() for k, v in _tensors(model).items()}
-    for index, slots in model.policy.optimizer.state_dict()["state"].items():
-        arrays |= {f"adam.{index}.{k}": v.detach().cpu().numpy() for k, v in slots.items()}
+    for name, optimizer in optimizers.items():
+        for index, slots in optimizer.state_dict()["state"].items():
+            arrays |= {f"{name}.{index}.{k}": v.detach().cpu().numpy() for k, v in slots.items()}
     for name, moments in _moments(normaliser).items():
         arrays |= {
             f"{name}.mean": np.asarray(moments.mean),
@@ -62,7 +72,7 @@ def capture(model: PPO) -> Arrays:
     return arrays | _numpy_random()
 
 
-def restore(model: PPO, arrays: Arrays) -> None:
+def restore(model: BaseAlgorithm, arrays: Arrays, optimizers: Mapping[str, Optimizer]) -> None:
     """Bring a model that was made with the same settings to a captured state.
 
     Raises
@@ -71,10 +81,11 @@ def restore(model: PPO, arrays: Arrays) -> None:
         If the arrays are another model's.
     """
     normaliser, walkers = _environment(model)
-    try:
+    with refused_as_another_s():
         policy = {k: torch.from_numpy(arrays[f"policy.{k}"].copy()) for k in _tensors(model)}
         model.policy.load_state_dict(policy)
-        _restore_optimizer(model, arrays)
+        for name, optimizer in optimizers.items():
+            _restore_optimizer(name, optimizer, arrays)
         for name, moments in _moments(normaliser).items():
             moments.mean = arrays[f"{name}.mean"].copy()
             moments.var = arrays[f"{name}.var"].copy()
@@ -90,20 +101,27 @@ def restore(model: PPO, arrays: Arrays) -> None:
         model._last_episode_starts = arrays["last.starts"].copy()
         torch.set_rng_state(torch.from_numpy(arrays["random.torch"].copy()))
         _restore_numpy_random(arrays)
+
+
+@contextlib.contextmanager
+def refused_as_another_s() -> Iterator[None]:
+    """What goes wrong within is a checkpoint of a training with other settings."""
+    try:
+        yield
     except (KeyError, RuntimeError, ValueError) as error:
         raise CheckpointError(
             f"the checkpoint is not of a training with these settings: {error}"
         ) from error
 
 
-def _environment(model: PPO) -> tuple[VecNormalize, WalkerVecEnv]:
+def _environment(model: BaseAlgorithm) -> tuple[VecNormalize, WalkerVecEnv]:
     normaliser = model.get_vec_normalize_env()
     if normaliser is None or not isinstance(normaliser.unwrapped, WalkerVecEnv):
         raise TypeError("the model must train on a WalkerVecEnv within a VecNormalize")
     return normaliser, normaliser.unwrapped
 
 
-def _tensors(model: PPO) -> dict[str, torch.Tensor]:
+def _tensors(model: BaseAlgorithm) -> dict[str, torch.Tensor]:
     return model.policy.state_dict()
 
 
@@ -111,11 +129,10 @@ def _moments(normaliser: VecNormalize) -> dict[str, Any]:
     return {"observations": normaliser.obs_rms, "returns": normaliser.ret_rms}
 
 
-def _restore_optimizer(model: PPO, arrays: Arrays) -> None:
-    optimizer = model.policy.optimizer
+def _restore_optimizer(prefix: str, optimizer: Optimizer, arrays: Arrays) -> None:
     state: dict[int, dict[str, torch.Tensor]] = {}
     for name, value in arrays.items():
-        if name.startswith("adam."):
+        if name.startswith(f"{prefix}."):
             _, index, slot = name.split(".")
             state.setdefault(int(index), {})[slot] = torch.from_numpy(value.copy())
     groups = optimizer.state_dict()["param_groups"]

@@ -16,8 +16,13 @@ from agents.evaluation.reporting import progress_bar
 from agents.evaluation.scoring import Row, evaluate
 from agents.evaluation.tables import rows_to_plain
 from agents.files import read_json, write_json
-from agents.learning.ppo import TrainingLog, train_ppo
-from agents.learning.ppo_settings import PPOSettings, settings_for
+from agents.learning.algorithms import (
+    Settings,
+    algorithm_named,
+    settings_from_plain,
+    settings_to_plain,
+)
+from agents.learning.results import Report, TrainingLog
 from agents.policies.policy import Policy
 from agents.policies.storage import CARD_FILE, options_from_plain, options_to_plain, save, task_of
 from agents.registry import AgentRequest, env_id_of, make_all
@@ -34,6 +39,8 @@ CURVE_FILE = "learning_curve.png"
 FOOTPRINTS_FILE = "footprints.png"
 EVALUATION_FILE = "evaluation.json"
 STATISTICS_FILE = "observation_statistics.json"
+EVALUATION = 0
+"""Seed of the episodes that runs are judged on: the same for all of them, so that what differs is the training."""
 
 
 @dataclass(frozen=True)
@@ -44,22 +51,24 @@ class Training:
     ----------
     env_id : an environment's id
     seed : of the policy's start, the walkers and all that is drawn
-    settings : PPO's
+    settings : the algorithm's
     options : the environment's
     episodes : of the evaluation
     threads : of torch and of the walkers
     checkpoint_seconds : least time between two checkpoints
     tensorboard : write TensorBoard's logs too
+    algorithm : a name in ``ALGORITHMS``
     """
 
     env_id: str
     seed: int
-    settings: PPOSettings
+    settings: Settings
     options: EnvOptions
     episodes: int = 1000
     threads: int = 1
     checkpoint_seconds: float = 5.0
     tensorboard: bool = False
+    algorithm: str = "ppo"
 
     @classmethod
     def of_task(
@@ -74,10 +83,9 @@ class Training:
         """
         env_id = env_id_of(task)
         training_seed(seed)
-        evaluation_seed(seed)
         require_number("episodes", others.get("episodes", cls.episodes), 1, MOST_EPISODES)
         require_number("threads", others.get("threads", cls.threads), 1, 1024)
-        settings = settings_for(env_id)
+        settings = algorithm_named(others.get("algorithm", cls.algorithm)).settings_for(env_id)
         if steps is not None:
             settings = replace(settings, steps=steps)
         return cls(env_id, seed, settings, EnvOptions(), **others)
@@ -93,9 +101,9 @@ class Result:
 
 
 def new_run(training: Training, out: Path) -> Path:
-    """Make the folder of a new run under ``out``, named by task, time and seed, and note in it what is trained."""
+    """Make the folder of a new run under ``out``, named by task, algorithm, time and seed, and note in it what is trained."""
     stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
-    name = f"{task_of(training.env_id)}-{stamp}-seed{training.seed}"
+    name = f"{task_of(training.env_id)}-{training.algorithm}-{stamp}-seed{training.seed}"
     folder = out / name
     number = 1
     while folder.exists():
@@ -103,10 +111,11 @@ def new_run(training: Training, out: Path) -> Path:
         folder = out / f"{name}-{number}"
     folder.mkdir(parents=True)
     record = asdict(training) | {
+        "settings": settings_to_plain(training.settings),
         "options": options_to_plain(training.options),
         "versions": package_versions(),
         "walkers_seed": training_seed(training.seed),
-        "evaluation_seed": evaluation_seed(training.seed),
+        "evaluation_seed": evaluation_seed(EVALUATION),
     }
     write_json(folder / RUN_FILE, record)
     return folder
@@ -169,16 +178,23 @@ def read_run(folder: Path) -> Training:
     names = set(Training.__dataclass_fields__)
     try:
         values = {key: value for key, value in record.items() if key in names}
-        settings = values["settings"]
-        values["settings"] = PPOSettings(**settings | {"hidden": tuple(settings["hidden"])})
+        values["settings"] = settings_from_plain(
+            values.get("algorithm", Training.algorithm), values["settings"]
+        )
         values["options"] = options_from_plain(values["options"])
         return Training(**values)
     except (AttributeError, KeyError, TypeError) as error:
         raise ValueError(f"{str(folder / RUN_FILE)!r} is not a run's: {error}") from error
 
 
-def run(folder: Path, *, progress: bool = True) -> Result:
+def run(folder: Path, *, progress: bool = True, report: Report | None = None) -> Result:
     """Train what a run's folder says, or go on with it, and leave there all that comes of it.
+
+    Parameters
+    ----------
+    folder : that ``new_run`` made
+    progress : show bars
+    report : told of the steps done, between updates
 
     Raises
     ------
@@ -186,7 +202,7 @@ def run(folder: Path, *, progress: bool = True) -> Result:
         If the folder's files are damaged.
     """
     training = read_run(folder)
-    trained = train_ppo(
+    trained = algorithm_named(training.algorithm).train(
         training.env_id,
         training.settings,
         seed=training.seed,
@@ -195,6 +211,7 @@ def run(folder: Path, *, progress: bool = True) -> Result:
         checkpoint_seconds=training.checkpoint_seconds,
         threads=training.threads,
         progress=progress,
+        report=report,
         tensorboard=folder / "tensorboard" if training.tensorboard else None,
     )
     save(trained.policy, folder)
@@ -212,7 +229,7 @@ def _is_finished(folder: Path) -> bool:
 
 
 def _judged_agents(training: Training, policy: Policy) -> dict[str, Agent]:
-    """The trained policy beside the agents that need no training and know the task."""
+    """The trained policy beside the quick agents that need no training and know the task."""
     request = AgentRequest(training.env_id, training.options, seed=training.seed)
     return make_all(request, ("baseline", "feedback")) | {policy.card.algorithm: policy}
 
@@ -223,7 +240,7 @@ def _judge(training: Training, agents: Mapping[str, Agent], progress: bool) -> l
             task_of(training.env_id),
             agents,
             episodes=training.episodes,
-            seed=training.seed,
+            seed=EVALUATION,
             options=training.options,
             progress=bar.update,
         )
@@ -237,11 +254,11 @@ def _draw(
     rows: list[Row],
 ) -> None:
     task = task_of(training.env_id)
-    title = f"PPO on {task}, seed {training.seed}: {training.settings.steps:,} steps in {log.seconds:.0f} s"
+    title = f"{training.algorithm.upper()} on {task}, seed {training.seed}: {training.settings.steps:,} steps in {log.seconds:.0f} s"
     save_learning_curve(log, rows, title, training.settings.steps, folder / CURVE_FILE)
     save_agents_footprints(
         agents, task, folder / FOOTPRINTS_FILE,
-        seed=evaluation_seed(training.seed), options=training.options,
+        seed=evaluation_seed(EVALUATION), options=training.options,
     )  # fmt: skip
 
 
