@@ -157,12 +157,15 @@ HEADING_FEATURE = Feature(
     "commanded heading less the mean of the last two footprints', within half a turn",
 )
 HEADING_METRICS = {
-    "mean_absolute_heading_error": Metric(ERROR_SUM, c.TIME, "rad, over time"),
+    "mean_absolute_heading_error": Metric(ERROR_SUM, c.TIME, "rad, over time", "lower"),
     "settled_fraction": Metric(
-        SETTLED_SUM, c.TIME, f"of the time, with an error below {SETTLED} rad"
+        SETTLED_SUM, c.TIME, f"of the time, with an error below {SETTLED} rad", "higher"
     ),
     "mean_settling_time": Metric(
-        SETTLING_SUM, SETTLED_COMMANDS, "from a new command to settled, of commands that got there"
+        SETTLING_SUM,
+        SETTLED_COMMANDS,
+        "from a new command to settled, of commands that got there",
+        "lower",
     ),
     "commands": Metric(COMMANDS, None, "headings commanded so far"),
 }

@@ -93,9 +93,12 @@ TASK = Task(
     features=(HEADING_FEATURE,),
     metrics={
         **HEADING_METRICS,
-        "mean_speed": Metric(c.DISTANCE, c.TIME, "distance along the headings over time"),
+        "mean_speed": Metric(c.DISTANCE, c.TIME, "distance along the headings over time", "higher"),
         "cost_of_transport": Metric(
-            WORK_SUM, c.DISTANCE, "work per weight and distance; of a step's work, what is positive"
+            WORK_SUM,
+            c.DISTANCE,
+            "work per weight and distance; of a step's work, what is positive",
+            "lower",
         ),
     },
     summary="Walk on a level floor, or up a gentle slope (`slope=-0.005`), powered by nothing but moving the masses from side to side, and "

@@ -62,8 +62,8 @@ TASK = Task(
     start_many=start_many,
     features=(),
     metrics={
-        "survived_200_steps": Metric(SURVIVED, None, f"1 from step {TRIAL} on"),
-        "time_walked": Metric(c.TIME, None, "units of time"),
+        "survived_200_steps": Metric(SURVIVED, None, f"1 from step {TRIAL} on", "higher"),
+        "time_walked": Metric(c.TIME, None, "units of time", "higher"),
     },
     summary="Stay on your feet: after every step both rates get a random impulse, which the next observation shows as part of the rates. "
     f"At push_level = 1 the standard deviations are {PITCH_PUSH} on the pitch rate and {ANKLE_PUSH} on the ankle rate.",
@@ -72,4 +72,5 @@ TASK = Task(
     horizon=300.0,
     max_offset_change=LARGEST_CHANGE,
     push_level=PUSH_LEVEL,
+    headline="survived_200_steps",
 )

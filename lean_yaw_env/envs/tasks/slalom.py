@@ -181,7 +181,7 @@ TASK = Task(
         ),
     ),
     metrics={
-        "rms_cross_track_error": Metric(ROOT_MEAN_SQUARE, None, "leg lengths, over time"),
+        "rms_cross_track_error": Metric(ROOT_MEAN_SQUARE, None, "leg lengths, over time", "lower"),
         "cross_track_error": Metric(CROSS_TRACK, None, "leg lengths, to the right, at this step"),
         "downhill": Metric(c.PLACE_X, None, "leg lengths, progress downhill"),
     },

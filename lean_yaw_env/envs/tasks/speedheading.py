@@ -128,7 +128,7 @@ TASK = Task(
     ),
     metrics={
         **HEADING_METRICS,
-        "mean_absolute_speed_error": Metric(SPEED_ERROR_SUM, c.TIME, "over time"),
+        "mean_absolute_speed_error": Metric(SPEED_ERROR_SUM, c.TIME, "over time", "lower"),
         "commanded_speed": Metric(SPEED, None, "in force"),
     },
     summary=f"Walk where and as fast as you are told: a heading within {LARGEST_SLOPE_COMMAND} rad of downhill and a speed from "

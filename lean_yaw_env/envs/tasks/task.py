@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from lean_yaw_env.parameters import Vector, WalkerParameters
 
 
 @dataclass(frozen=True)
 class Metric:
-    """One number of an episode's result, apart from reward: a column of memory, or a quotient of two (0 over 0 is 0)."""
+    """One number of an episode's result, apart from reward: a column of memory, or a quotient of two (0 over 0 is 0).
+
+    ``better`` is the direction that an agent is to be judged by; None for what only describes an episode.
+    """
 
     column: int
     divisor: int | None = None
     meaning: str = ""
+    better: Literal["higher", "lower"] | None = None
 
 
 class Feature(NamedTuple):
@@ -49,6 +53,7 @@ class Task:
         One walker's step, a batch's step, and the start of episodes; arguments as in ``envs.running``.
     features : what the task appends to the observation
     metrics : success metrics, apart from reward
+    headline : the one of them, or "return", by which agents are compared: it must say enough without a look at survival
     summary, reward, ends, history : str
         For the documents: what is asked, the reward's rate per unit of time, what ends an episode apart from a fall and the horizon, and
         a sentence for each version.
@@ -83,3 +88,4 @@ class Task:
     max_offset_change: float = 0.005
     push_level: float = 0.0
     pumping: float = 0.0
+    headline: str = "return"

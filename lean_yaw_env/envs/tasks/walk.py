@@ -76,8 +76,8 @@ TASK = Task(
     start_many=start_many,
     features=(),
     metrics={
-        "time_walked": Metric(c.TIME, None, "units of time"),
-        "distance": Metric(c.DISTANCE, None, "leg lengths, along the headings"),
+        "time_walked": Metric(c.TIME, None, "units of time", "higher"),
+        "distance": Metric(c.DISTANCE, None, "leg lengths, along the headings", "higher"),
     },
     summary="Keep walking; nothing is commanded.",
     reward=f"{WALKING_RATE} - {EFFORT_RATE} effort",

@@ -127,7 +127,7 @@ TASK = Task(
         Feature("goal_distance", DISTANCE_SCALE, "leg lengths", "distance of the goal"),
     ),
     metrics={
-        "goals": Metric(GOALS, None, "reached so far"),
+        "goals": Metric(GOALS, None, "reached so far", "higher"),
         "goal_distance": Metric(GOAL_DISTANCE, None, "leg lengths, to the goal in force"),
     },
     summary=f"Walk to one place after another: each {NEAREST:g} to {FARTHEST:g} leg lengths from where the walker is when it is set, at any "
@@ -144,4 +144,5 @@ TASK = Task(
     goal_radius=RADIUS,
     parameters=WalkerParameters(slope_turns=True),
     horizon=300.0,
+    headline="goals",
 )
