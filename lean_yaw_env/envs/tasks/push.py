@@ -62,7 +62,7 @@ TASK = Task(
     start_many=start_many,
     features=(),
     metrics={
-        "survived_200_steps": Metric(SURVIVED, None, f"1 from step {TRIAL} on", "higher"),
+        "survived_200_steps": Metric(SURVIVED, None, f"1 from step {TRIAL} on", "higher", True),
         "time_walked": Metric(c.TIME, None, "units of time", "higher"),
     },
     summary="Stay on your feet: after every step both rates get a random impulse, which the next observation shows as part of the rates. "

@@ -13,13 +13,15 @@ from lean_yaw_env.parameters import Vector, WalkerParameters
 class Metric:
     """One number of an episode's result, apart from reward: a column of memory, or a quotient of two (0 over 0 is 0).
 
-    ``better`` is the direction that an agent is to be judged by; None for what only describes an episode.
+    ``better`` is the direction that an agent is to be judged by; None for what only describes an episode. ``is_share`` says that it is 0 or 1
+    for an episode, so that a share is all there is to tell of many.
     """
 
     column: int
     divisor: int | None = None
     meaning: str = ""
     better: Literal["higher", "lower"] | None = None
+    is_share: bool = False
 
 
 class Feature(NamedTuple):
