@@ -9,28 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.agent import State
-from agents.controllers.lqr import HeadingLqr, LqrLoop, LqrSettings
-from agents.controllers.regulator import LqrWeights
+from agents.controllers.lqr import HeadingLqr, LqrLoop, LqrSettings, UprightLqr
+from agents.controllers.tuned import tuned
 from agents.observations import ObservationLayout
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.parameters import Vector
 
 _PREVIEW = "preview_"
-
-
-def _path_loop() -> LqrSettings:
-    return LqrSettings(
-        LqrWeights(
-            heading=0.18,
-            ankle_angle=0.46,
-            stance_pitch_rate=0.11,
-            ankle_rate=1.4,
-            inter_leg_angle=0.055,
-            offset_change=0.0083,
-        ),
-        inter_leg_angle=0.278,
-        largest_error=1.13,
-    )
 
 
 @dataclass(frozen=True)
@@ -48,7 +33,7 @@ class PathSettings:
 
     ahead: float = 2.4
     approach: float = 6.0
-    loop: LqrSettings = field(default_factory=_path_loop)
+    loop: LqrSettings = field(default_factory=LqrSettings)
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.ahead <= 8.0:
@@ -86,7 +71,7 @@ class PathGuidance:
     ) -> None:
         chosen = EnvOptions() if options is None else options
         _require(task, chosen, ("cross_track_error", "path_heading_error"))
-        self._settings = PathSettings() if settings is None else settings
+        self._settings = tuned("lqr", task, PathSettings()) if settings is None else settings
         self._loop = LqrLoop(task, chosen, self._settings.loop)
         names = [name for name in self._loop.layout.names if name.startswith(_PREVIEW)]
         self._previews = [(name, float(name.removeprefix(_PREVIEW))) for name in names]
@@ -133,21 +118,6 @@ class PathGuidance:
         return np.asarray(slope @ np.linalg.inv(conditions), dtype=float)
 
 
-def _waypoint_loop() -> LqrSettings:
-    return LqrSettings(
-        LqrWeights(
-            heading=0.096,
-            ankle_angle=0.14,
-            stance_pitch_rate=2.8,
-            ankle_rate=0.41,
-            inter_leg_angle=0.071,
-            offset_change=0.011,
-        ),
-        inter_leg_angle=0.364,
-        largest_error=0.46,
-    )
-
-
 @dataclass(frozen=True)
 class WaypointSettings:
     """Settings of ``WaypointGuidance``.
@@ -157,17 +127,11 @@ class WaypointSettings:
     radius : leg lengths
         Of the turn that can be relied on. A goal within that turn's circle is not turned to, which would be orbiting it; the walker
         goes straight on until it can.
-    turning_bearing : rad
-        Bearing from which on the walker turns with the steps of ``loop.inter_leg_angle``: long ones lean, and so turn, most.
-    fast_angle : rad
-        Inter-leg angle straight on: short steps are faster.
     loop : LqrSettings
     """
 
     radius: float = 4.1
-    turning_bearing: float = 0.23
-    fast_angle: float = 0.281
-    loop: LqrSettings = field(default_factory=_waypoint_loop)
+    loop: LqrSettings = field(default_factory=LqrSettings)
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.radius < math.inf:
@@ -201,7 +165,9 @@ class WaypointGuidance:
     ) -> None:
         chosen = EnvOptions() if options is None else options
         _require(task, chosen, ("goal_bearing", "goal_distance"))
-        self._settings = WaypointSettings() if settings is None else settings
+        self._settings = (
+            tuned("lqr", task, WaypointSettings()) if settings is None else settings
+        )
         self._loop = LqrLoop(task, chosen, self._settings.loop)
 
     def predict(
@@ -219,9 +185,7 @@ class WaypointGuidance:
         # a circle through here along the heading and through the goal has this radius: distance / (2 sin(bearing))
         can_turn = distance >= 2.0 * self._settings.radius * np.abs(np.sin(bearing))
         error = np.where(can_turn, bearing, 0.0)
-        fast, slow = self._settings.fast_angle, self._settings.loop.inter_leg_angle
-        share = np.minimum(np.abs(error) / self._settings.turning_bearing, 1.0)
-        return self._loop.actions(seen, error, inter_leg_angle=fast + share * (slow - fast)), None
+        return self._loop.actions(seen, error), None
 
 
 def _require(task: str, options: EnvOptions, needs: tuple[str, ...]) -> None:
@@ -233,19 +197,19 @@ def _require(task: str, options: EnvOptions, needs: tuple[str, ...]) -> None:
             )
 
 
-def guided(task: str, options: EnvOptions) -> HeadingLqr | PathGuidance | WaypointGuidance:
+def guided(task: str, options: EnvOptions) -> HeadingLqr | PathGuidance | UprightLqr | WaypointGuidance:
     """The regulator with the guidance that a task's observations call for.
 
     Raises
     ------
-    ValueError
-        If the task shows no heading error, path or goal, or its slope does not go down.
     NoGaitError
-        If the walker has no gait down its slope.
+        If the walker has no gait to regulate about.
     """
     names = ObservationLayout.of(task, options).names
     if "goal_bearing" in names:
         return WaypointGuidance(task, options)
     if "cross_track_error" in names:
         return PathGuidance(task, options)
-    return HeadingLqr(task, options)
+    if "heading_error" in names:
+        return HeadingLqr(task, options)
+    return UprightLqr(task, options)

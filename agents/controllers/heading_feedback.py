@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.agent import State
+from agents.controllers.gaits import Pumping, has_downhill
+from agents.controllers.tuned import tuned
 from agents.observations import ObservationLayout
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, gait_of
 from lean_yaw_env.envs.tasks import task_named
-from lean_yaw_env.parameters import STATE_FIELDS
+from lean_yaw_env.parameters import STATE_FIELDS, Vector
 
 _ERROR = "heading_error"
+_SPEED, _SPEED_ERROR = "commanded_speed", "speed_error"
 _ANKLE = [field.name for field in STATE_FIELDS].index("ankle_angle")
 _ANKLE_RATE = [field.name for field in STATE_FIELDS].index("ankle_rate")
+_MIDDLE_SPEED = 0.42
+"""Of the gait at the paper's inter-leg angle on the paper's slope."""
 
 
 @dataclass(frozen=True)
 class HeadingGains:
-    """Gains of ``HeadingFeedback``; the defaults are what ``python -m agents.controllers.tune_feedback`` found.
+    """Gains of ``HeadingFeedback``.
 
     Attributes
     ----------
@@ -31,6 +36,10 @@ class HeadingGains:
     feedforward : share of the offset that holds the commanded heading
     inter_leg_angle : change of the inter-leg angle from 0.3, rad, held all the time
         Longer steps are slower in time but lean, and so turn, faster.
+    speed : rad of inter-leg angle per commanded speed above 0.42
+    speed_error : rad of inter-leg angle per speed that is lacking
+    pumping : Pumping
+        Offsets away from the stance foot that drive the walker beside the slope.
     """
 
     proportional: float = 0.051
@@ -38,18 +47,22 @@ class HeadingGains:
     ankle_rate: float = 0.0104
     feedforward: float = 0.947
     inter_leg_angle: float = 0.106
+    speed: float = 0.0
+    speed_error: float = 0.0
+    pumping: Pumping = field(default_factory=Pumping)
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not math.isfinite(value):
-                raise ValueError(f"{name} must be a finite number, not {value!r}")
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if isinstance(value, float) and not math.isfinite(value):
+                raise ValueError(f"{entry.name} must be a finite number, not {value!r}")
 
 
 class HeadingFeedback:
-    """Steers to the commanded heading by moving the masses.
+    """Steers to the commanded heading by moving the masses; sets a commanded speed by the inter-leg angle.
 
     The feedforward is the offset that holds a heading phi for good, sin(phi) = -mu / tan(slope); feedback is on the heading error
-    and, as its derivative, on the lean of the ankle.
+    and, as its derivative, on the lean of the ankle. Where the slope does not drive the walker, pumping does.
 
     Parameters
     ----------
@@ -57,7 +70,8 @@ class HeadingFeedback:
         A task that shows a heading error.
     options : EnvOptions
         Those of the environment.
-    gains : HeadingGains
+    gains : HeadingGains, optional
+        Those tuned for the task otherwise.
 
     Raises
     ------
@@ -79,11 +93,12 @@ class HeadingFeedback:
             raise ValueError(
                 f"task must show {_ERROR} for feedback on it, but {task!r} shows {', '.join(self._layout.names)}"
             )
-        self._gains = HeadingGains() if gains is None else gains
+        self._gains = tuned("feedback", task, HeadingGains()) if gains is None else gains
         parameters = self._options.walker_parameters(task_named(task))
-        gait = gait_of(parameters)
+        gait = gait_of(parameters, self._gains.pumping.downhill)
         self._gait_ankle, self._gait_ankle_rate = gait[_ANKLE], gait[_ANKLE_RATE]
         self._tangent = math.tan(parameters.slope)
+        self._has_downhill = has_downhill(parameters)
 
     def predict(
         self,
@@ -95,28 +110,40 @@ class HeadingFeedback:
         """Actions of the law; see ``Agent.predict``. It remembers nothing and draws nothing."""
         seen = self._layout.require(observation)
         action = np.empty((*seen.shape[:-1], ACTION_SIZE), dtype=np.float32)
-        action[..., 0] = _share(self._gains.inter_leg_angle, self._options.inter_leg_angle_range)
+        action[..., 0] = _share(self._angle_change(seen), self._options.inter_leg_angle_range)
         action[..., 1] = _share(self._offset(seen), self._options.mass_offset_range)
         return np.clip(action, -1.0, 1.0), None
 
-    def _offset(self, seen: NDArray[np.float32]) -> NDArray[np.float64]:
+    def _angle_change(self, seen: NDArray[np.float32]) -> Vector:
+        """How far from 0.3 rad the inter-leg angle is to be."""
+        change = np.full(seen.shape[:-1], self._gains.inter_leg_angle)
+        if _SPEED in self._layout.names:
+            wanted = self._layout.quantity(seen, _SPEED)
+            lacking = self._layout.quantity(seen, _SPEED_ERROR)
+            change += self._gains.speed * (wanted - _MIDDLE_SPEED)
+            change += self._gains.speed_error * lacking
+        return change
+
+    def _offset(self, seen: NDArray[np.float32]) -> Vector:
         """The mass offset to command, in the frame of the observation: mirrored where that is."""
         layout, gains = self._layout, self._gains
         error = layout.quantity(seen, _ERROR)
-        commanded = layout.quantity(seen, "heading") + error
+        heading = layout.quantity(seen, "heading")
         # in a mirrored observation the walker always stands on its left foot
         side = 1.0 if self._options.mirror else layout.quantity(seen, "stance_foot")
         ankle = layout.quantity(seen, "ankle_angle") - side * self._gait_ankle
         ankle_rate = layout.quantity(seen, "ankle_rate") - side * self._gait_ankle_rate
-        holding = -self._tangent * np.sin(commanded)
+        holding = -self._tangent * np.sin(heading + error)
+        along = heading if self._has_downhill else 0.0 * heading
         return (
             gains.feedforward * holding
             - gains.proportional * error
             + gains.ankle * ankle
             + gains.ankle_rate * ankle_rate
+            + side * gains.pumping.along(along)
         )
 
 
-def _share(value: float | NDArray[np.float64], reach: float) -> float | NDArray[np.float64]:
+def _share(value: Vector, reach: float) -> Vector:
     """The action that means a value; none where actions mean nothing."""
     return value / reach if reach > 0.0 else 0.0 * value

@@ -1,4 +1,4 @@
-"""Linear-quadratic regulation of heading and speed: the optimal feedback of ``regulator``, from observations to actions."""
+"""Linear-quadratic regulation of heading and speed: the optimal feedback of ``schedule``, from observations to actions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.agent import State
-from agents.controllers.regulator import ANGLES, LqrWeights, schedule_of
+from agents.controllers.gaits import ANGLES, Pumping
+from agents.controllers.regulator import LqrWeights
+from agents.controllers.schedule import Scheduled, schedule_of
+from agents.controllers.tuned import tuned
 from agents.observations import ObservationLayout
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
 from lean_yaw_env.envs.tasks import task_named
@@ -24,22 +27,32 @@ class LqrSettings:
     ----------
     weights : LqrWeights
     inter_leg_angle : rad
-        Of the gait to regulate about, where no speed is commanded.
+        Of the gait to regulate about on the wanted heading, where no speed is commanded.
+    turning_angle : rad
+        Of the gait where the heading error is ``turning_error`` or more: long steps lean, and so turn, most.
+    turning_error : rad
     largest_error : rad
         Larger heading errors are taken as this one: a linear law knows no limits.
+    pumping : Pumping
+        What drives the gait beside the slope.
     """
 
     weights: LqrWeights = field(default_factory=LqrWeights)
     inter_leg_angle: float = 0.4
+    turning_angle: float = 0.4
+    turning_error: float = 0.2
     largest_error: float = 1.4
+    pumping: Pumping = field(default_factory=Pumping)
 
     def __post_init__(self) -> None:
-        if not ANGLES[0] <= self.inter_leg_angle <= ANGLES[-1]:
-            raise ValueError(
-                f"inter_leg_angle must be in [{ANGLES[0]}, {ANGLES[-1]}], not {self.inter_leg_angle!r}"
-            )
-        if not 0.0 < self.largest_error <= math.pi:
-            raise ValueError(f"largest_error must be in (0, pi], not {self.largest_error!r}")
+        for name in ("inter_leg_angle", "turning_angle"):
+            value = getattr(self, name)
+            if not ANGLES[0] <= value <= ANGLES[-1]:
+                raise ValueError(f"{name} must be in [{ANGLES[0]}, {ANGLES[-1]}], not {value!r}")
+        for name in ("turning_error", "largest_error"):
+            value = getattr(self, name)
+            if not 0.0 < value <= math.pi:
+                raise ValueError(f"{name} must be in (0, pi], not {value!r}")
 
 
 class LqrLoop:
@@ -48,28 +61,22 @@ class LqrLoop:
     Parameters
     ----------
     task : str
-        Any task down a slope.
     options : EnvOptions
         Those of the environment.
     settings : LqrSettings
 
     Raises
     ------
-    ValueError
-        If the slope does not go down.
     NoGaitError
-        If the walker has no gait down its slope.
+        If the walker has no gait to regulate about: none is without a slope or pumping.
     """
 
     def __init__(self, task: str, options: EnvOptions, settings: LqrSettings) -> None:
         made = task_named(task)
-        parameters = options.walker_parameters(made)
-        if parameters.slope <= 0.0:
-            raise ValueError(
-                f"slope must be above 0 for a gait to regulate about, not {parameters.slope!r} (task {task})"
-            )
         self.layout = ObservationLayout.of(task, options)
-        self.schedule = schedule_of(parameters, settings.weights)
+        self.schedule = schedule_of(
+            options.walker_parameters(made), settings.weights, settings.pumping
+        )
         self.settings = settings
         self._options = options
         change = options.max_offset_change
@@ -82,12 +89,7 @@ class LqrLoop:
         return np.where(self.layout.quantity(seen, "stance_foot") < 0.0, -1.0, 1.0)
 
     def actions(
-        self,
-        seen: NDArray[np.float32],
-        error: Vector,
-        *,
-        speed: Vector | None = None,
-        inter_leg_angle: Vector | None = None,
+        self, seen: NDArray[np.float32], error: Vector, *, speed: Vector | None = None
     ) -> NDArray[np.float32]:
         """Actions for observations.
 
@@ -97,48 +99,55 @@ class LqrLoop:
         error : shape (...)
             Wanted heading less the mean of the last two footprints', in the frame of the observation, rad.
         speed : shape (...), optional
-            Wanted; in place of the inter-leg angle.
-        inter_leg_angle : shape (...), optional
-            Of the gait to regulate about, rad; the settings' otherwise.
+            Wanted; in place of the settings' inter-leg angles.
         """
-        side, settings = self.side(seen), self.settings
-        state = self._section_state(seen, side)
-        offset = side * self.layout.quantity(seen, "mass_offset")
-        error = np.clip(side * error, -settings.largest_error, settings.largest_error)
-        heading = state[..., 0]
-        if self.schedule.has_downhill:
-            # no gait is known beyond the schedule's headings
-            low, high = self.schedule.headings[[0, -1]]
-            heading = np.clip(state[..., 0] + error, low, high)
-            error = heading - state[..., 0]
-        angle = np.full(error.shape, settings.inter_leg_angle)
-        if inter_leg_angle is not None:
-            angle = inter_leg_angle
-        if speed is not None:
-            angle = self.schedule.angles_of(speed, heading)
-        gait, held, gains, turns = self.schedule.at(angle, heading)
-        rest = np.concatenate([state - gait, (offset - held)[..., None]], axis=-1)[..., 1:]
+        side = self.side(seen)
+        state, offset = self._section_state(seen, side)
+        error, heading = self._within_reach(side * error, state[..., 0])
+        angle = self._angle(error) if speed is None else self.schedule.angles_of(speed, heading)
+        gait = self.schedule.at(angle, heading)
+        rest = _deviation(gait, state, offset)
         # feedback is on the last footprint's heading, half of the last turn ahead of the mean
-        ahead = 0.5 * np.sum(turns * rest, axis=-1)
+        ahead = 0.5 * np.sum(gait.turn * rest, axis=-1)
         deviation = np.concatenate([(ahead - error)[..., None], rest], axis=-1)
-        inputs = -np.einsum("...ij,...j->...i", gains, deviation)
-        change = np.clip(inputs[..., 1], -self._largest_change, self._largest_change)
-        return self._as_actions(angle + inputs[..., 0], side * (offset + change))
+        inputs = -np.einsum("...ij,...j->...i", gait.gain, deviation)
+        # a gait that pumps moves the masses from one side to the other by itself
+        change = 2.0 * gait.pumping + inputs[..., 1]
+        change = np.clip(change, -self._largest_change, self._largest_change)
+        return self._as_actions(gait.inter_leg_angle + inputs[..., 0], side * (offset + change))
 
     def last_turn(self, seen: NDArray[np.float32]) -> Vector:
         """How far the last step turned, as far as the state tells it; in the frame of the observation, rad, shape (...)."""
         side = self.side(seen)
-        state = self._section_state(seen, side)
-        offset = side * self.layout.quantity(seen, "mass_offset")
-        angle = np.full(side.shape, self.settings.inter_leg_angle)
-        gait, held, _, turns = self.schedule.at(angle, state[..., 0])
-        rest = np.concatenate([state - gait, (offset - held)[..., None]], axis=-1)[..., 1:]
-        return side * np.sum(turns * rest, axis=-1)
+        state, offset = self._section_state(seen, side)
+        gait = self.schedule.at(np.full(side.shape, self.settings.inter_leg_angle), state[..., 0])
+        return side * np.sum(gait.turn * _deviation(gait, state, offset), axis=-1)
 
-    def _section_state(self, seen: NDArray[np.float32], side: Vector) -> Vector:
+    def _within_reach(self, error: Vector, heading: Vector) -> tuple[Vector, Vector]:
+        """The error that is answered, and the heading whose gait is regulated about."""
+        largest = self.settings.largest_error
+        error = np.clip(error, -largest, largest)
+        if not self.schedule.has_downhill:
+            return error, np.zeros_like(error)
+        low, high = self.schedule.headings[[0, -1]]
+        wanted = heading + error
+        if high >= math.pi:
+            return error, wanted - 2.0 * math.pi * np.round(wanted / (2.0 * math.pi))
+        # no gait is known beyond the schedule's headings
+        wanted = np.clip(wanted, low, high)
+        return wanted - heading, wanted
+
+    def _angle(self, error: Vector) -> Vector:
+        straight, turning = self.settings.inter_leg_angle, self.settings.turning_angle
+        share = np.minimum(np.abs(error) / self.settings.turning_error, 1.0)
+        return straight + share * (turning - straight)
+
+    def _section_state(self, seen: NDArray[np.float32], side: Vector) -> tuple[Vector, Vector]:
+        """State and offset as of a left stance."""
         columns = [self.layout.quantity(seen, field.name) for field in STATE_FIELDS]
         state = np.stack(columns, axis=-1)
-        return np.where(side[..., None] < 0.0, MIRROR * state, state)
+        state = np.where(side[..., None] < 0.0, MIRROR * state, state)
+        return state, side * self.layout.quantity(seen, "mass_offset")
 
     def _as_actions(self, angle: Vector, offset: Vector) -> NDArray[np.float32]:
         options = self._options
@@ -150,18 +159,10 @@ class LqrLoop:
         return np.clip(actions, -1.0, 1.0)
 
 
-SPEED_SETTINGS = LqrSettings(
-    LqrWeights(
-        heading=0.18,
-        ankle_angle=0.17,
-        stance_pitch_rate=1.1,
-        ankle_rate=0.11,
-        inter_leg_angle=0.35,
-        offset_change=0.0052,
-    ),
-    largest_error=0.76,
-)
-"""Where a speed is commanded as well."""
+def _deviation(gait: Scheduled, state: Vector, offset: Vector) -> Vector:
+    """(..., 5): state without heading, and offset, less the gait's; the masses are where the right foot's step left them."""
+    before = gait.held_offset - gait.pumping
+    return np.concatenate([state - gait.state, (offset - before)[..., None]], axis=-1)[..., 1:]
 
 
 class HeadingLqr:
@@ -172,7 +173,8 @@ class HeadingLqr:
     task : str
     options : EnvOptions
         Those of the environment.
-    settings : LqrSettings
+    settings : LqrSettings, optional
+        Those tuned for the task otherwise.
 
     Raises
     ------
@@ -195,8 +197,9 @@ class HeadingLqr:
                 f"task must show heading_error for feedback on it, but {task!r} shows {', '.join(names)}"
             )
         self._has_speed = "commanded_speed" in names
-        default = SPEED_SETTINGS if self._has_speed else LqrSettings()
-        self.loop = LqrLoop(task, chosen, default if settings is None else settings)
+        self.loop = LqrLoop(
+            task, chosen, tuned("lqr", task, LqrSettings()) if settings is None else settings
+        )
 
     def predict(
         self,
@@ -210,3 +213,45 @@ class HeadingLqr:
         seen = layout.require(observation)
         speed = layout.quantity(seen, "commanded_speed") if self._has_speed else None
         return self.loop.actions(seen, layout.quantity(seen, "heading_error"), speed=speed), None
+
+
+class UprightLqr:
+    """Linear-quadratic regulator for tasks that command nothing: it keeps the walker in its gait, straight downhill. It remembers nothing.
+
+    Parameters
+    ----------
+    task : str
+    options : EnvOptions
+        Those of the environment.
+    settings : LqrSettings
+
+    Raises
+    ------
+    NoGaitError
+        If the walker has no gait to regulate about.
+    """
+
+    def __init__(
+        self,
+        task: str = "Push",
+        options: EnvOptions | None = None,
+        settings: LqrSettings | None = None,
+    ) -> None:
+        chosen = EnvOptions() if options is None else options
+        self.loop = LqrLoop(
+            task, chosen, tuned("lqr", task, LqrSettings()) if settings is None else settings
+        )
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: State = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.float32], State]:
+        """Actions of the regulator; see ``Agent.predict``."""
+        loop = self.loop
+        seen = loop.layout.require(observation)
+        # where the slope turns with the walker its heading is shown as zero, and any is as good
+        mean = loop.layout.quantity(seen, "heading") - 0.5 * loop.last_turn(seen)
+        return loop.actions(seen, -mean), None

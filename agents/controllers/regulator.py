@@ -1,4 +1,4 @@
-"""Optimal linear feedback (LQR) on the exact step map about the gaits, scheduled over inter-leg angle and heading.
+"""Optimal linear feedback (LQR) on the exact step map about a gait.
 
 A right stance is taken as its mirror image, so that walking straight is one map repeated, z' = A z + B v, with
 
@@ -7,42 +7,27 @@ A right stance is taken as its mirror image, so that walking straight is one map
 
 With the offset in the state and its change as the input, the limit on the change is part of what is optimised: asking for more costs more.
 A heading phi off downhill is held by the offset of the closed form, sin(phi) = -offset / tan(slope); its mirror image is the gait of -phi,
-so that the two alternate and the optimal gains are periodic, of period two.
+so that the two alternate and the optimal gains are periodic, of period two. A gait that pumps has the masses on alternate sides: its own change
+of the offset is part of it, and v is what is added.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.interpolate import RegularGridInterpolator
 from scipy.linalg import solve_discrete_are
 
-from lean_yaw_env.analysis.fixed_point import solve_fixed_point
-from lean_yaw_env.analysis.section_map import ActiveMap
 from lean_yaw_env.analysis.stride import differentiate_step
-from lean_yaw_env.envs.options import gait_of
-from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.records import Command
-from lean_yaw_env.parameters import (
-    INTER_LEG_ANGLE,
-    MIRROR,
-    STATE_SIZE,
-    Vector,
-    WalkerParameters,
-)
+from lean_yaw_env.parameters import MIRROR, STATE_SIZE, Vector
 from lean_yaw_env.walker import Walker
 
 SIZE = STATE_SIZE + 1
 """Of the regulated state: the section state and the mass offset in force."""
-ANGLES = tuple(np.linspace(0.15, 0.45, 13).tolist())
-HEADINGS = tuple(np.linspace(-0.7, 0.7, 9).tolist())
 _PRIOR = (0.01, 0.03, 0.05, 0.08, 0.03)
 """How far states stray from the gait, heading apart; weighs what the last step's turn is estimated from."""
-_COLUMNS = np.cumsum((STATE_SIZE, 1, 1, 2 * SIZE, STATE_SIZE))
 
 
 @dataclass(frozen=True)
@@ -99,18 +84,23 @@ class LinearStep:
 
 
 def linearise_step(
-    walker: Walker, state: Vector, inter_leg_angle: float, mass_offset: float
+    walker: Walker,
+    state: Vector,
+    inter_leg_angle: float,
+    mass_offset: float,
+    previous_offset: float | None = None,
 ) -> LinearStep:
-    """Linearise the mirrored step from a left-stance section state (5,) with the masses held at ``mass_offset``.
+    """Linearise the mirrored step from a left-stance section state (5,), the masses going from ``previous_offset`` to ``mass_offset``.
+
+    Without a previous offset they are held.
 
     Raises
     ------
     FellError
         If the walker does not complete the step.
     """
-    step = differentiate_step(
-        walker, state, "left", Command(inter_leg_angle, mass_offset, mass_offset)
-    )
+    before = mass_offset if previous_offset is None else previous_offset
+    step = differentiate_step(walker, state, "left", Command(inter_leg_angle, mass_offset, before))
     by_state, by_input = np.zeros((SIZE, SIZE)), np.zeros((SIZE, 2))
     by_state[:STATE_SIZE, :STATE_SIZE] = MIRROR[:, None] * step.by_state
     by_state[:STATE_SIZE, -1] = MIRROR * (step.by_mass_offset + step.by_previous_offset)
@@ -121,8 +111,10 @@ def linearise_step(
     return LinearStep(by_state, by_input)
 
 
-def periodic_gain(now: LinearStep, then: LinearStep, weights: LqrWeights) -> Vector:
-    """The optimal gain (2, 6), input = -gain z, for ``now`` where the two steps alternate for ever.
+def periodic_gains(
+    now: LinearStep, then: LinearStep, weights: LqrWeights
+) -> tuple[Vector, Vector]:
+    """The optimal gains (2, 6), input = -gain z, for ``now`` and for ``then`` where the two steps alternate for ever.
 
     The Riccati equation is that of two steps at once; its solution is the cost to go before ``now``, and the one before ``then`` follows
     by one step of the recursion.
@@ -137,7 +129,7 @@ def periodic_gain(now: LinearStep, then: LinearStep, weights: LqrWeights) -> Vec
     cost_to_go = solve_discrete_are(both, by_both, state_cost, input_cost, s=cross)
     gain = _gain(then, cost_to_go, inputs)
     before_then = costs + then.by_state.T @ cost_to_go @ (then.by_state - then.by_input @ gain)
-    return _gain(now, 0.5 * (before_then + before_then.T), inputs)
+    return _gain(now, 0.5 * (before_then + before_then.T), inputs), gain
 
 
 def _gain(step: LinearStep, cost_to_go: Vector, inputs: Vector) -> Vector:
@@ -156,165 +148,3 @@ def last_turn(before: LinearStep, weights: LqrWeights) -> Vector:
     turned, seen = ways[0], ways[1:]
     floor = 1e-6 * np.diag(np.square(_PRIOR))
     return np.linalg.solve(seen @ seen.T + floor, seen @ turned)
-
-
-@dataclass(frozen=True)
-class GaitNode:
-    """A gait on the left foot, and the feedback about it.
-
-    Attributes
-    ----------
-    state : shape (5,)
-        Its heading is that of the mean of two footprints apart.
-    mass_offset, speed : float
-    step : LinearStep
-    """
-
-    state: Vector
-    mass_offset: float
-    speed: float
-    step: LinearStep
-
-
-class _GaitGrid:
-    """Follows gaits over a grid of inter-leg angles and headings."""
-
-    def __init__(self, parameters: WalkerParameters, angles: Vector, headings: Vector) -> None:
-        self._walker = Walker(replace(parameters, friction_limit=math.inf))
-        self._turns = parameters.slope_turns
-        self.angles, self.headings = angles, headings
-
-    def nodes(self, start: Vector) -> list[list[GaitNode]]:
-        """Gaits of the grid, each followed from its neighbour; where one is lost, its neighbour stands for it."""
-        rows: dict[int, list[GaitNode]] = {}
-        middle = int(np.argmin(np.abs(self.angles - INTER_LEG_ANGLE)))
-        straight = self._node(self.angles[middle], 0.0, start)
-        for way in (range(middle, -1, -1), range(middle, len(self.angles))):
-            seed = straight
-            for i in way:
-                seed = self._node_or(seed, self.angles[i], 0.0)
-                rows[i] = self._row(self.angles[i], seed)
-        return [rows[i] for i in range(len(self.angles))]
-
-    def _row(self, angle: float, straight: GaitNode) -> list[GaitNode]:
-        if self._turns:
-            return [straight] * len(self.headings)
-        half = len(self.headings) // 2
-        sides: list[list[GaitNode]] = []
-        for headings in (self.headings[half - 1 :: -1], self.headings[half + 1 :]):
-            side, node = [], straight
-            for heading in headings:
-                node = self._node_or(node, angle, float(heading))
-                side.append(node)
-            sides.append(side)
-        return [*sides[0][::-1], straight, *sides[1]]
-
-    def _node_or(self, seed: GaitNode, angle: float, heading: float) -> GaitNode:
-        start = seed.state.copy()
-        start[0] += heading
-        try:
-            return self._node(angle, heading, start)
-        except NoGaitError:
-            return seed
-
-    def _node(self, angle: float, heading: float, start: Vector) -> GaitNode:
-        walker = self._walker
-        offset = 0.0 if self._turns else -math.tan(walker.parameters.slope) * math.sin(heading)
-        two_steps = ActiveMap(walker, angle, (offset, offset))
-        state = solve_fixed_point(two_steps, start, exact=True)
-        first, second = two_steps.results(state)
-        chord = float(np.linalg.norm(first.displacement + second.displacement))
-        step = linearise_step(walker, state, angle, offset)
-        apart = state.copy()
-        apart[0] = 0.5 * (state[0] - first.state[0])
-        return GaitNode(apart, offset, chord / (first.duration + second.duration), step)
-
-
-@lru_cache(maxsize=16)
-def _gait_nodes(parameters: WalkerParameters) -> tuple[tuple[GaitNode, ...], ...]:
-    """Gaits and linear steps of the whole grid, which do not depend on what is optimised."""
-    grid = _GaitGrid(parameters, np.array(ANGLES), np.array(HEADINGS))
-    return tuple(tuple(row) for row in grid.nodes(np.array(gait_of(parameters))))
-
-
-class GainSchedule:
-    """Gaits and optimal gains over inter-leg angle and heading, linear between the nodes of a grid.
-
-    Parameters
-    ----------
-    parameters : WalkerParameters
-        With a slope to walk down.
-    weights : LqrWeights
-
-    Attributes
-    ----------
-    angles, headings : rad
-        The grid. Where the slope turns with the walker the heading means nothing.
-    has_downhill : bool
-        Whether headings are from downhill.
-    speeds : shape (angles, headings)
-
-    Raises
-    ------
-    NoGaitError
-        If the walker has no gait straight downhill at 0.3 rad.
-    """
-
-    def __init__(self, parameters: WalkerParameters, weights: LqrWeights) -> None:
-        self.has_downhill = not parameters.slope_turns
-        self.angles = np.array(ANGLES)
-        self.headings = np.array(HEADINGS)
-        nodes = _gait_nodes(parameters)
-        values = np.array(
-            [[self._values(row[k], row[-1 - k], weights) for k in range(len(row))] for row in nodes]
-        )
-        self._table = RegularGridInterpolator((self.angles, self.headings), values)
-        self.speeds = values[..., STATE_SIZE + 1]
-
-    def at(self, angles: Vector, headings: Vector) -> tuple[Vector, Vector, Vector, Vector]:
-        """Gait states (..., 5), offsets (...), gains (..., 2, 6) and estimators of the last turn (..., 5), held at the grid's edges."""
-        points = np.stack(
-            [
-                np.clip(angles, self.angles[0], self.angles[-1]),
-                np.clip(headings, self.headings[0], self.headings[-1]),
-            ],
-            axis=-1,
-        )
-        found = self._table(points).reshape(
-            *points.shape[:-1], -1
-        )  # it makes a row of a single point
-        states, offsets, _, gains, turns, _ = np.split(found, _COLUMNS, axis=-1)
-        return states, offsets[..., 0], gains.reshape(*gains.shape[:-1], 2, SIZE), turns
-
-    def angles_of(self, speeds: Vector, headings: Vector) -> Vector:
-        """The inter-leg angles whose gaits walk at these speeds along these headings, or the nearest of the grid."""
-        share = np.interp(headings, self.headings, np.arange(len(self.headings)))
-        low = np.minimum(share.astype(int), len(self.headings) - 2)
-        candidates = np.stack([self._inverse(speeds, low), self._inverse(speeds, low + 1)])
-        return candidates[0] + (share - low) * (candidates[1] - candidates[0])
-
-    def _inverse(self, speeds: Vector, columns: NDArray[np.int64]) -> Vector:
-        found = np.empty(np.shape(speeds))
-        for column in range(len(self.headings)):
-            # longer steps are slower
-            inverse = np.interp(speeds, self.speeds[::-1, column], self.angles[::-1])
-            found = np.where(columns == column, inverse, found)
-        return found
-
-    @staticmethod
-    def _values(node: GaitNode, mirrored: GaitNode, weights: LqrWeights) -> Vector:
-        gain = periodic_gain(node.step, mirrored.step, weights)
-        turn = last_turn(mirrored.step, weights)
-        return np.concatenate([node.state, [node.mass_offset, node.speed], gain.ravel(), turn])
-
-
-@lru_cache(maxsize=16)
-def schedule_of(parameters: WalkerParameters, weights: LqrWeights) -> GainSchedule:
-    """The schedule of a walker and weights, made once.
-
-    Raises
-    ------
-    NoGaitError
-        As ``GainSchedule``.
-    """
-    return GainSchedule(parameters, weights)

@@ -1,0 +1,203 @@
+"""A family of gaits over inter-leg angle and heading, driven by the slope or by pumping, with the step map linearised about each."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TypeVar
+
+import numpy as np
+from scipy.optimize import root
+
+from agents.controllers.regulator import LinearStep, linearise_step
+from lean_yaw_env.analysis.fixed_point import RESIDUAL_LIMIT, solve_fixed_point
+from lean_yaw_env.analysis.section_map import ActiveMap
+from lean_yaw_env.envs.options import gait_of
+from lean_yaw_env.errors import LeanYawError, NoGaitError
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector, WalkerParameters, require_number
+from lean_yaw_env.walker import Walker
+
+ANGLES = tuple(np.linspace(0.15, 0.45, 13).tolist())
+DOWNHILL_HEADINGS = tuple(np.linspace(-0.7, 0.7, 9).tolist())
+ALL_HEADINGS = tuple(np.linspace(-math.pi, math.pi, 17).tolist())
+
+Number = TypeVar("Number", float, Vector)
+
+
+@dataclass(frozen=True)
+class Pumping:
+    """Mass offsets away from the stance foot that drive gaits; none, where both are zero.
+
+    Attributes
+    ----------
+    downhill, uphill : leg lengths, in [0, 0.1]
+        Straight down and straight up; in between as the slope along the heading is. On the level, and where the slope turns with the walker,
+        ``downhill`` counts.
+    """
+
+    downhill: float = 0.0
+    uphill: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_number("pumping downhill", self.downhill, 0.0, 0.1)
+        require_number("pumping uphill", self.uphill, 0.0, 0.1)
+
+    def __bool__(self) -> bool:
+        return self.downhill > 0.0 or self.uphill > 0.0
+
+    def along(self, heading: Number) -> Number:
+        """The offset for a heading, or an array of them, from downhill."""
+        up = 0.5 * (1.0 - np.cos(heading))
+        return self.downhill + up * (self.uphill - self.downhill)
+
+
+@dataclass(frozen=True)
+class GaitNode:
+    """A gait on the left foot, and the step map about it.
+
+    Attributes
+    ----------
+    inter_leg_angle : rad
+    state : shape (5,)
+        Its heading is that of the mean of two footprints apart.
+    held_offset : float
+        What holds the heading: the mean of both feet's offsets.
+    pumping : float
+        What the left foot's offset has more than that.
+    speed : float
+    step : LinearStep
+    """
+
+    inter_leg_angle: float
+    state: Vector
+    held_offset: float
+    pumping: float
+    speed: float
+    step: LinearStep
+
+
+def has_downhill(parameters: WalkerParameters) -> bool:
+    """Whether headings differ: not on the level, nor where the slope turns with the walker."""
+    return parameters.slope != 0.0 and not parameters.slope_turns
+
+
+def headings_of(parameters: WalkerParameters, pumping: Pumping) -> tuple[float, ...]:
+    """The headings of a family's gaits: those that the slope gives energy for, or all if it pumps; one stands for all without a downhill."""
+    if not has_downhill(parameters):
+        return (0.0, 0.0)
+    return ALL_HEADINGS if pumping else DOWNHILL_HEADINGS
+
+
+class _GaitGrid:
+    """Follows gaits over a grid of inter-leg angles and headings."""
+
+    def __init__(self, parameters: WalkerParameters, pumping: Pumping) -> None:
+        self._walker = Walker(replace(parameters, friction_limit=math.inf))
+        self._has_downhill = has_downhill(parameters)
+        self._pumping = pumping
+        self._headings = headings_of(parameters, pumping)
+
+    def nodes(self, start: Vector) -> list[list[GaitNode]]:
+        """Gaits of the grid, each followed from its neighbour; where one is lost, its neighbour stands for it."""
+        rows: dict[int, list[GaitNode]] = {}
+        middle = int(np.argmin(np.abs(np.array(ANGLES) - INTER_LEG_ANGLE)))
+        straight = self._solve(ANGLES[middle], 0.0, start, 0.0)
+        for way in (range(middle, -1, -1), range(middle, len(ANGLES))):
+            seed = straight
+            for i in way:
+                seed = self._followed(seed, ANGLES[i], 0.0)
+                rows[i] = self._row(ANGLES[i], seed)
+        return [rows[i] for i in range(len(ANGLES))]
+
+    def _row(self, angle: float, straight: GaitNode) -> list[GaitNode]:
+        if not self._has_downhill:
+            return [straight] * len(self._headings)
+        half = len(self._headings) // 2
+        sides: list[list[GaitNode]] = []
+        for headings in (self._headings[half - 1 :: -1], self._headings[half + 1 :]):
+            side, node = [], straight
+            for heading in headings:
+                node = self._followed(node, angle, heading)
+                side.append(node)
+            sides.append(side)
+        return [*sides[0][::-1], straight, *sides[1]]
+
+    def _followed(self, seed: GaitNode, angle: float, heading: float) -> GaitNode:
+        start = seed.state.copy()
+        start[0] += heading
+        try:
+            return self._solve(angle, heading, start, seed.held_offset)
+        except NoGaitError:
+            return seed
+
+    def _solve(self, angle: float, heading: float, start: Vector, held: float) -> GaitNode:
+        """The gait that repeats at this heading, and the offset that holds it."""
+        aside = self._pumping.along(heading) if self._has_downhill else self._pumping.downhill
+        two_steps = ActiveMap(self._walker, angle, (held + aside, held - aside), 2)
+        if self._has_downhill:
+            two_steps, state = _held_gait(two_steps, start)
+        else:
+            state = solve_fixed_point(two_steps, start)
+        first, second = two_steps.results(state)
+        chord = float(np.linalg.norm(first.displacement + second.displacement))
+        left, right = two_steps.mass_offset
+        apart = state.copy()
+        apart[0] = 0.5 * (state[0] - first.state[0])
+        return GaitNode(
+            inter_leg_angle=angle,
+            state=apart,
+            held_offset=0.5 * (left + right),
+            pumping=aside,
+            speed=chord / (first.duration + second.duration),
+            step=linearise_step(self._walker, state, angle, left, right),
+        )
+
+
+def _held_gait(two_steps: ActiveMap, start: Vector) -> tuple[ActiveMap, Vector]:
+    """The gait along the start's heading, with the map whose mean offset holds it.
+
+    Across the slope a heading moves without end as the offset does, so that the heading is given and the offset found.
+
+    Raises
+    ------
+    NoGaitError
+        If the root finder stops anywhere else.
+    """
+
+    def split(x: Vector) -> tuple[ActiveMap, Vector]:
+        return two_steps.moved("mass_offset", float(x[0])), np.array([start[0], *x[1:]])
+
+    def change(x: Vector) -> Vector:
+        moved, state = split(x)
+        return moved.image(state) - state
+
+    def slope(x: Vector) -> Vector:
+        moved, state = split(x)
+        _, matrix, by_offset = moved.sensitivity(state, "mass_offset")
+        return np.column_stack([by_offset, (matrix - np.eye(len(state)))[:, 1:]])
+
+    guess = np.array([two_steps.value("mass_offset"), *start[1:]])
+    try:
+        found = root(change, guess, jac=slope, options={"xtol": 1e-15}).x
+        residual = float(np.abs(change(found)).max())
+    except (LeanYawError, ValueError, np.linalg.LinAlgError) as error:
+        raise NoGaitError(str(error)) from error
+    if not residual <= RESIDUAL_LIMIT:
+        raise NoGaitError(f"the root finder stopped at a residual of {residual:.1e}")
+    return split(found)
+
+
+@lru_cache(maxsize=16)
+def gait_nodes(
+    parameters: WalkerParameters, pumping: Pumping
+) -> tuple[tuple[GaitNode, ...], ...]:
+    """Gaits and linear steps over ``ANGLES`` and the family's headings.
+
+    Raises
+    ------
+    NoGaitError
+        If the walker has no gait straight downhill at the paper's inter-leg angle.
+    """
+    start = np.array(gait_of(parameters, pumping.downhill))
+    return tuple(tuple(row) for row in _GaitGrid(parameters, pumping).nodes(start))
