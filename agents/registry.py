@@ -12,7 +12,14 @@ from agents.controllers.guidance import guided
 from agents.controllers.heading_feedback import HeadingFeedback
 from agents.controllers.simple import FixedController, RandomController
 from agents.files import read_json
-from agents.policies.storage import CARD_FILE, DEFAULT_ALGORITHM, load, shipped_seeds, task_of
+from agents.policies.storage import (
+    CARD_FILE,
+    DEFAULT_ALGORITHM,
+    load,
+    shipped_folder,
+    shipped_seeds,
+    task_of,
+)
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.registration import ENV_IDS, TASK_VERSIONS
@@ -34,16 +41,14 @@ class AgentRequest:
     options : the environment's
     seed : for agents that draw
     path : folder of a trained policy, for agents that are trained; the newest under ``runs``, or the package's own, otherwise
-    runs : where trainings leave their folders
-    shipped : seed of the training whose policy of the package's own is wanted, whatever is under ``runs``
+    runs : where trainings leave their folders; None for the package's own whatever was trained since
     """
 
     env_id: str
     options: EnvOptions
     seed: int = 0
     path: Path | None = None
-    runs: Path = Path("runs")
-    shipped: int | None = None
+    runs: Path | None = Path("runs")
 
 
 @dataclass(frozen=True)
@@ -70,10 +75,8 @@ def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
     """Makes an algorithm's trained policy: of the folder asked for, the newest run or the package."""
 
     def made(request: AgentRequest) -> Agent:
-        if request.shipped is not None:
-            return load(request.env_id, algorithm=algorithm, seed=request.shipped)
-        folder = request.path or newest_policy(request.env_id, request.runs, algorithm)
-        source = request.env_id if folder is None else folder
+        folders = policy_folders(algorithm, request)
+        source = folders[0] if folders else request.env_id  # whose absence is explained there
         return load(source, env_id=request.env_id, algorithm=algorithm)
 
     return made
@@ -83,11 +86,7 @@ AGENTS: dict[str, AgentEntry] = {
     "random": AgentEntry("baseline", lambda request: RandomController(request.seed)),
     "fixed": AgentEntry("baseline", lambda request: FixedController()),
     "feedback": AgentEntry("feedback", _feedback, ("Heading", "SpeedHeading", "UTurn", "Level")),
-    "lqr": AgentEntry(
-        "feedback",
-        lambda request: guided(task_of(request.env_id), request.options),
-        ("Heading", "SpeedHeading", "Waypoint", "Slalom", "UTurn"),
-    ),
+    "lqr": AgentEntry("feedback", lambda request: guided(task_of(request.env_id), request.options)),
     "ppo": AgentEntry("learned", _trained("ppo")),
 }
 """Every agent, in the order of tables; a learned one has the name of its algorithm."""
@@ -127,7 +126,7 @@ def names_for(request: AgentRequest, kinds: Collection[Kind] = KINDS) -> tuple[s
         for name, entry in AGENTS.items()
         if entry.kind in kinds
         and task in entry.tasks
-        and (entry.kind != "learned" or _is_trained(name, request))
+        and (entry.kind != "learned" or policy_folders(name, request))
     )
 
 
@@ -142,10 +141,18 @@ def make_all(request: AgentRequest, kinds: Collection[Kind] = QUICK_KINDS) -> di
     return agents
 
 
-def _is_trained(algorithm: str, request: AgentRequest) -> bool:
-    if request.path is not None or shipped_seeds(request.env_id, algorithm):
-        return True
-    return newest_policy(request.env_id, request.runs, algorithm) is not None
+def policy_folders(algorithm: str, request: AgentRequest) -> list[Path]:
+    """Where the trained policies asked for are: one folder, or of the package's own all, one for each seed; none if there is none."""
+    if request.path is not None:
+        return [request.path]
+    if request.runs is not None:
+        newest = newest_policy(request.env_id, request.runs, algorithm)
+        if newest is not None:
+            return [newest]
+    return [
+        shipped_folder(request.env_id, algorithm, seed)
+        for seed in shipped_seeds(request.env_id, algorithm)
+    ]
 
 
 def env_id_of(task: str) -> str:
@@ -160,7 +167,7 @@ def env_id_of(task: str) -> str:
 def newest_policy(env_id: str, runs: Path, algorithm: str = DEFAULT_ALGORITHM) -> Path | None:
     """The folder of an algorithm's policy for an environment that was written last under ``runs``, if there is any."""
     found: list[tuple[float, Path]] = []
-    for card in runs.glob(f"*/{CARD_FILE}"):
+    for card in runs.rglob(CARD_FILE):
         try:
             values = read_json(card)
         except ValueError:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import binomtest, bootstrap
 
 from agents.agent import Agent, State
+from agents.evaluation.results import RETURN, SPEED, Episodes, Results, Row, summary
 from agents.seeds import MOST_EPISODES, evaluation_seed
 from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.options import EnvOptions
@@ -18,44 +16,9 @@ from lean_yaw_env.envs.tasks import Task, task_named
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.parameters import Vector, require_number
 
-CONFIDENCE = 0.95
-RESAMPLES = 2000
 _CHUNK = 1024  # walkers stepped together
 
 Progress = Callable[[int], object]
-
-
-@dataclass(frozen=True)
-class Episodes:
-    """What came of an agent's episodes.
-
-    Attributes
-    ----------
-    survived : bool, shape (episodes,)
-        Whether the time limit and nothing else ended it.
-    metrics : by name, each of shape (episodes,)
-        ``return``, the task's metrics and ``speed`` (distance over time); NaN where an episode leaves one undefined.
-    """
-
-    survived: NDArray[np.bool_]
-    metrics: dict[str, Vector]
-
-
-@dataclass(frozen=True)
-class Row:
-    """The mean of a metric over episodes with its 95 % interval, and beside it the share of episodes survived.
-
-    An error's mean is over the time walked, so that it says little of an agent that falls: read ``survival`` with it.
-    """
-
-    task: str
-    agent: str
-    metric: str
-    mean: float
-    low: float
-    high: float
-    survival: float
-    episodes: int
 
 
 def run_episodes(
@@ -103,13 +66,7 @@ def run_seeds(
         _run_chunk(agent, task, seeds[start : start + _CHUNK], options, progress)
         for start in range(0, len(seeds), _CHUNK)
     ]
-    return Episodes(
-        survived=np.concatenate([part.survived for part in parts]),
-        metrics={
-            name: np.concatenate([part.metrics[name] for part in parts])
-            for name in parts[0].metrics
-        },
-    )
+    return Episodes.joined(parts)
 
 
 def evaluate(
@@ -132,48 +89,11 @@ def evaluate(
         raise ValueError("agents must hold one agent or more, not none")
     rows: list[Row] = []
     for name, agent in agents.items():
-        results = run_episodes(
+        walked = run_episodes(
             agent, task, episodes=episodes, seed=seed, options=options, progress=progress
         )
-        rows += summary(task, name, results)
+        rows += summary(Results(task, name, (walked,)))
     return rows
-
-
-def summary(task: str, agent: str, results: Episodes) -> list[Row]:
-    """Means and intervals of episodes."""
-    survival = float(results.survived.mean())
-    episodes = len(results.survived)
-    rows = [
-        Row(task, agent, name, *mean_interval(values), survival, episodes)
-        for name, values in results.metrics.items()
-    ]
-    low, high = survival_interval(results.survived)
-    rows.append(Row(task, agent, "survival", survival, low, high, survival, episodes))
-    return rows
-
-
-def mean_interval(values: Vector) -> tuple[float, float, float]:
-    """The mean of the defined values with its 95 % interval by the percentile bootstrap; NaN where there are none.
-
-    The resampling is seeded: the same values give the same interval.
-    """
-    defined = values[np.isfinite(values)]
-    if len(defined) == 0:
-        return float("nan"), float("nan"), float("nan")
-    mean = float(defined.mean())
-    if defined.min() == defined.max():  # resampling has nothing to draw
-        return mean, mean, mean
-    interval = bootstrap(
-        (defined,), np.mean, n_resamples=RESAMPLES, confidence_level=CONFIDENCE,
-        method="percentile", batch=100, rng=np.random.default_rng(0),
-    ).confidence_interval  # fmt: skip
-    return mean, float(interval.low), float(interval.high)
-
-
-def survival_interval(survived: NDArray[np.bool_]) -> tuple[float, float]:
-    """Wilson's 95 % interval of a share: unlike a bootstrap's it has a width where every episode was survived."""
-    interval = binomtest(int(survived.sum()), len(survived)).proportion_ci(CONFIDENCE, "wilson")
-    return float(interval.low), float(interval.high)
 
 
 def _run_chunk(
@@ -210,12 +130,12 @@ def _run_chunk(
             if progress is not None:
                 progress(int(now.sum()))
     env.close()
-    metrics["return"] = returns
+    metrics[RETURN] = returns
     return Episodes(survived, metrics)
 
 
 def _metric_names(task: Task) -> tuple[str, ...]:
-    return ("return", *task.metrics, "speed")
+    return (RETURN, *task.metrics, SPEED)
 
 
 def _metrics(task: Task, memory: Vector) -> dict[str, Vector]:
@@ -226,7 +146,7 @@ def _metrics(task: Task, memory: Vector) -> dict[str, Vector]:
         if metric.divisor is not None:
             values = _quotient(values, memory[:, metric.divisor])
         found[name] = values
-    found["speed"] = _quotient(memory[:, c.DISTANCE], memory[:, c.TIME])
+    found[SPEED] = _quotient(memory[:, c.DISTANCE], memory[:, c.TIME])
     return found
 
 
