@@ -89,6 +89,15 @@ SETTINGS: dict[str, PPOSettings] = {
         steps=2_400_000, walkers=256, batch_size=2048, learning_rate=3e-3, push_level=0.05
     ),
     "LeanYaw/Walk-v0": PPOSettings(steps=200_000),
+    "LeanYaw/Push-v0": PPOSettings(
+        # harder pushes than the environment's: at 0.5 an early policy survives so long that it sees few falls to learn from
+        steps=2_400_000,
+        walkers=256,
+        batch_size=2048,
+        learning_rate=3e-3,
+        epochs=4,
+        push_level=0.8,
+    ),
 }
 """Settings that were tuned for an environment."""
 
