@@ -32,8 +32,8 @@ class Pumping:
     Attributes
     ----------
     downhill, uphill : leg lengths, in [0, 0.1]
-        Straight down and straight up; in between as the slope along the heading is. On the level, and where the slope turns with the walker,
-        ``downhill`` counts.
+        Straight down and straight up; in between as the slope along the heading is. Without one for uphill, that for downhill counts
+        everywhere, as it does on the level and where the slope turns with the walker.
     """
 
     downhill: float = 0.0
@@ -43,12 +43,9 @@ class Pumping:
         require_number("pumping downhill", self.downhill, 0.0, 0.1)
         require_number("pumping uphill", self.uphill, 0.0, 0.1)
 
-    def __bool__(self) -> bool:
-        return self.downhill > 0.0 or self.uphill > 0.0
-
     def along(self, heading: Number) -> Number:
         """The offset for a heading, or an array of them, from downhill."""
-        up = 0.5 * (1.0 - np.cos(heading))
+        up = 0.5 * (1.0 - np.cos(heading)) if self.uphill else 0.0 * heading
         return self.downhill + up * (self.uphill - self.downhill)
 
 
@@ -83,10 +80,10 @@ def has_downhill(parameters: WalkerParameters) -> bool:
 
 
 def headings_of(parameters: WalkerParameters, pumping: Pumping) -> tuple[float, ...]:
-    """The headings of a family's gaits: those that the slope gives energy for, or all if it pumps; one stands for all without a downhill."""
+    """The headings of a family's gaits: those that the slope gives energy for, or all if it pumps uphill; one stands for all without a downhill."""
     if not has_downhill(parameters):
         return (0.0, 0.0)
-    return ALL_HEADINGS if pumping else DOWNHILL_HEADINGS
+    return ALL_HEADINGS if pumping.uphill else DOWNHILL_HEADINGS
 
 
 class _GaitGrid:
@@ -188,7 +185,7 @@ def _held_gait(two_steps: ActiveMap, start: Vector) -> tuple[ActiveMap, Vector]:
     return split(found)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def gait_nodes(
     parameters: WalkerParameters, pumping: Pumping
 ) -> tuple[tuple[GaitNode, ...], ...]:

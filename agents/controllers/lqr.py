@@ -28,8 +28,8 @@ class LqrSettings:
     weights : LqrWeights
     inter_leg_angle : rad
         Of the gait to regulate about on the wanted heading, where no speed is commanded.
-    turning_angle : rad
-        Of the gait where the heading error is ``turning_error`` or more: long steps lean, and so turn, most.
+    turning_angle : rad, optional
+        Of the gait where the heading error is ``turning_error`` or more: long steps lean, and so turn, most. The same otherwise.
     turning_error : rad
     largest_error : rad
         Larger heading errors are taken as this one: a linear law knows no limits.
@@ -39,7 +39,7 @@ class LqrSettings:
 
     weights: LqrWeights = field(default_factory=LqrWeights)
     inter_leg_angle: float = 0.4
-    turning_angle: float = 0.4
+    turning_angle: float | None = None
     turning_error: float = 0.2
     largest_error: float = 1.4
     pumping: Pumping = field(default_factory=Pumping)
@@ -47,7 +47,7 @@ class LqrSettings:
     def __post_init__(self) -> None:
         for name in ("inter_leg_angle", "turning_angle"):
             value = getattr(self, name)
-            if not ANGLES[0] <= value <= ANGLES[-1]:
+            if value is not None and not ANGLES[0] <= value <= ANGLES[-1]:
                 raise ValueError(f"{name} must be in [{ANGLES[0]}, {ANGLES[-1]}], not {value!r}")
         for name in ("turning_error", "largest_error"):
             value = getattr(self, name)
@@ -139,6 +139,8 @@ class LqrLoop:
 
     def _angle(self, error: Vector) -> Vector:
         straight, turning = self.settings.inter_leg_angle, self.settings.turning_angle
+        if turning is None:
+            return np.full(np.shape(error), straight)
         share = np.minimum(np.abs(error) / self.settings.turning_error, 1.0)
         return straight + share * (turning - straight)
 

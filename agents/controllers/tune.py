@@ -16,6 +16,7 @@ import typer
 from tqdm import tqdm
 
 from agents.agent import Agent
+from agents.controllers.gaits import Pumping
 from agents.controllers.guidance import (
     PathGuidance,
     PathSettings,
@@ -24,9 +25,10 @@ from agents.controllers.guidance import (
 )
 from agents.controllers.heading_feedback import HeadingFeedback, HeadingGains
 from agents.controllers.lqr import HeadingLqr, LqrSettings, UprightLqr
-from agents.controllers.tuned import FILE, all_tuned, tuned, value_at, with_values
+from agents.controllers.regulator import LqrWeights
+from agents.controllers.tuned import FILE, tuned, value_at, with_values
 from agents.evaluation.scoring import run_seeds
-from agents.files import write_json
+from agents.files import read_json, write_json
 from agents.seeds import TUNING_SEEDS
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.errors import LeanYawError
@@ -42,7 +44,7 @@ _LOOP = {
     "weights.ankle_angle": (0.02, 5.0, True),
     "weights.stance_pitch_rate": (0.02, 5.0, True),
     "weights.ankle_rate": (0.02, 5.0, True),
-    "weights.mass_offset": (0.005, 5.0, True),
+    "weights.mass_offset": (0.005, 50.0, True),
     "weights.inter_leg_angle": (0.01, 1.0, True),
     "weights.offset_change": (0.001, 0.3, True),
 }
@@ -52,7 +54,7 @@ _TURN = {
     "largest_error": (0.1, 3.0, True),
 }
 _ANGLE = {"inter_leg_angle": (0.15, 0.45, False)}
-_PUMPING = {"pumping.downhill": (0.01, 0.045, False)}
+_PUMPING = {"pumping.downhill": (0.0, 0.045, False)}
 _UPHILL = {"pumping.uphill": (0.01, 0.05, False)}
 _STEERING = {
     "proportional": (0.0, 0.3, False),
@@ -77,20 +79,37 @@ class Search:
     settings : where nothing has been tuned yet
     ranges : of the numbers that are tuned, by their paths
     push_levels : each in its own episodes; None is the task's
+    horizon : units of time, if shorter than the task's: enough to tell good from bad
     """
 
     make: Callable[[Any], Agent]
     settings: Any
     ranges: dict[str, Range]
     push_levels: tuple[float | None, ...] = (None,)
+    horizon: float | None = None
+
+    def options(self) -> list[EnvOptions]:
+        """Those of each environment that settings are tried in."""
+        return [EnvOptions(push_level=level, horizon=self.horizon) for level in self.push_levels]
 
 
 def _loop(ranges: dict[str, Range]) -> dict[str, Range]:
     return {f"loop.{path}": entry for path, entry in ranges.items()}
 
 
+_PUMPED = LqrSettings(
+    LqrWeights(
+        heading=0.3, ankle_angle=0.1, ankle_rate=0.1, inter_leg_angle=0.1, offset_change=0.05
+    ),
+    pumping=Pumping(0.02),
+)
+"""Where tasks that allow pumping begin."""
+
+
 def _heading_lqr(task: str, ranges: dict[str, Range]) -> Search:
-    return Search(lambda settings: HeadingLqr(task, settings=settings), LqrSettings(), ranges)
+    pumps = "pumping.downhill" in ranges
+    start = _PUMPED if pumps else LqrSettings()
+    return Search(lambda settings: HeadingLqr(task, settings=settings), start, ranges)
 
 
 def _feedback(task: str, ranges: dict[str, Range]) -> Search:
@@ -111,9 +130,10 @@ SEARCHES: dict[tuple[str, str], Search] = {
     ),
     ("lqr", "Push"): Search(
         lambda settings: UprightLqr("Push", settings=settings),
-        LqrSettings(),
-        _LOOP | _ANGLE,
+        _PUMPED,
+        _LOOP | _ANGLE | _PUMPING,
         push_levels=(0.5, 0.7, 1.0),
+        horizon=150.0,
     ),
     ("lqr", "Slalom"): Search(
         lambda settings: PathGuidance("Slalom", settings=settings),
@@ -156,7 +176,7 @@ class Tuner:
     def values(self, shares: Vector) -> dict[str, float]:
         """The numbers that a point of the cube means, rounded to what is kept of them."""
         return {
-            path: float(f"{_value(share, entry):.{DIGITS}g}")
+            path: _rounded(path, _value(share, entry))
             for share, (path, entry) in zip(shares, self._search.ranges.items(), strict=True)
         }
 
@@ -168,16 +188,21 @@ class Tuner:
         except (LeanYawError, ValueError, np.linalg.LinAlgError):
             return math.inf
         returns = [
-            run_seeds(agent, self._task, self._seeds, options=EnvOptions(push_level=level))
-            .metrics["return"]
-            .mean()
-            for level in self._search.push_levels
+            run_seeds(agent, self._task, self._seeds, options=options).metrics["return"].mean()
+            for options in self._search.options()
         ]
         return -float(np.mean(returns))
 
 
-def _share(value: float, entry: Range) -> float:
+def _rounded(path: str, value: float) -> float:
+    """What is kept of a number. Gaits are found anew for each offset that pumps, so that few of those are tried."""
+    return round(float(value), 3) if "pumping" in path else float(f"{value:.{DIGITS}g}")
+
+
+def _share(value: float | None, entry: Range) -> float:
     low, high, by_ratio = entry
+    if value is None:
+        return 0.5
     if by_ratio:
         return math.log(min(value, high) / low) / math.log(high / low)
     return (value - low) / (high - low)
@@ -191,7 +216,10 @@ def _value(share: float, entry: Range) -> float:
 def tune(
     controller: str, task: str, *, evaluations: int, episodes: int, spread: float = SPREAD
 ) -> tuple[dict[str, float], float]:
-    """Search the settings, the same every time; return the best, the ones to begin with among them, and their mean return."""
+    """Search the settings, the same every time; return the best, the ones to begin with among them, and their mean return.
+
+    Better settings are kept as soon as they are found.
+    """
     tuner = Tuner(controller, task, episodes)
     start = tuner.start()
     search = cmaes.CMA(
@@ -208,7 +236,8 @@ def tune(
             search.tell(list(zip(points, _finite(costs), strict=True)))
             if min(costs) < least:
                 least, best = min(costs), points[int(np.argmin(costs))]
-            bar.set_postfix({"return": f"{-least:.2f}", "spread": f"{search._sigma:.3f}"})
+                keep(controller, task, tuner.values(best))
+            bar.set_postfix({"return": f"{-least:.2f}"})
     return tuner.values(best), -least
 
 
@@ -219,7 +248,7 @@ def _finite(costs: Sequence[float]) -> list[float]:
 
 def keep(controller: str, task: str, values: dict[str, float]) -> None:
     """Write settings to the file that controllers read."""
-    everything = {name: dict(tasks) for name, tasks in all_tuned().items()}
+    everything = read_json(FILE)
     everything.setdefault(controller, {})[task] = values
     write_json(FILE, everything)
 
@@ -242,7 +271,6 @@ def main(
     values, best = tune(
         controller, task, evaluations=evaluations, episodes=episodes, spread=spread
     )
-    keep(controller, task, values)
     typer.echo(f"{controller} {task}: return {best:.2f} with {values}")
 
 

@@ -38,11 +38,11 @@ def with_values(settings: Settings, values: Mapping[str, float]) -> Settings:
     return replace(settings, **own)  # type: ignore[type-var]
 
 
-def value_at(settings: Any, path: str) -> float:
-    """The number at a path."""
+def value_at(settings: Any, path: str) -> float | None:
+    """The number at a path, or None where there is none yet."""
     for name in path.split("."):
         settings = getattr(settings, name)
-    return float(settings)
+    return None if settings is None else float(settings)
 
 
 @lru_cache(maxsize=1)
