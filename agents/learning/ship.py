@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from agents.files import read_json, write_json
+from agents.learning.series import is_series, runs_of
 from agents.learning.training import EVALUATION_FILE
 from agents.policies.policy import Policy
 from agents.policies.storage import load, save, shipping_folder
@@ -55,17 +56,21 @@ def _rows(path: Path, policy: Policy) -> list[dict[str, Any]]:
 
 @app.command()
 def main(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folders of finished runs.")],
+    runs: Annotated[
+        list[Path],
+        typer.Argument(metavar="RUN...", help="Folders of finished runs, or of series of them."),
+    ],
     replace: Annotated[
         bool, typer.Option("--replace", help="Replace agents that are there already.")
     ] = False,
 ) -> None:
     """Copy the policies of finished runs into the package, as agents.load finds them by task, algorithm and seed."""
-    for run in runs:
-        try:
-            typer.echo(f"{run} -> {ship(run, replace=replace)}")
-        except ValueError as error:
-            raise typer.BadParameter(str(error)) from error
+    try:
+        for folder in runs:
+            for run in runs_of(folder).values() if is_series(folder) else (folder,):
+                typer.echo(f"{run} -> {ship(run, replace=replace)}")
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
 
 
 if __name__ == "__main__":

@@ -10,6 +10,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from agents.agent import Agent
 from agents.evaluation.pictures import save_agents_footprints, save_learning_curve
 from agents.evaluation.reporting import progress_bar
@@ -38,6 +40,7 @@ LOG_FILE = "episodes.csv"
 CURVE_FILE = "learning_curve.png"
 FOOTPRINTS_FILE = "footprints.png"
 EVALUATION_FILE = "evaluation.json"
+_LOG_COLUMNS = ("steps", "return", "length", "survived")
 STATISTICS_FILE = "observation_statistics.json"
 EVALUATION = 0
 """Seed of the episodes that runs are judged on: the same for all of them, so that what differs is the training."""
@@ -109,6 +112,12 @@ def new_run(training: Training, out: Path) -> Path:
     while folder.exists():
         number += 1
         folder = out / f"{name}-{number}"
+    make_run(training, folder)
+    return folder
+
+
+def make_run(training: Training, folder: Path) -> None:
+    """Make a run's folder, which must not be there, and note in it what is trained."""
     folder.mkdir(parents=True)
     record = asdict(training) | {
         "settings": settings_to_plain(training.settings),
@@ -118,7 +127,6 @@ def new_run(training: Training, out: Path) -> Path:
         "evaluation_seed": evaluation_seed(EVALUATION),
     }
     write_json(folder / RUN_FILE, record)
-    return folder
 
 
 def started_run(
@@ -152,24 +160,34 @@ def resumed_run(
     if folder is None:
         return unfinished_run(task, out)
     read_run(folder)
-    if _is_finished(folder):
+    if is_finished(folder):
         raise ValueError(f"the run in {str(folder)!r} is finished")
     return folder
 
 
 def unfinished_run(task: str, out: Path) -> Path:
     """The newest run of a task under ``out`` that is not finished, or ``ValueError`` if there is none."""
-    env_id = env_id_of(task)
-    found = [
-        path.parent
-        for path in out.glob(f"*/{RUN_FILE}")
-        if read_json(path).get("env_id") == env_id and not _is_finished(path.parent)
-    ]
+    found = unfinished_runs(task, out)
     if not found:
         raise ValueError(
             f"there is no unfinished training of {task} under {str(out)!r}; start one without --resume"
         )
     return max(found, key=lambda folder: (folder / RUN_FILE).stat().st_mtime)
+
+
+def unfinished_runs(task: str, out: Path) -> list[Path]:
+    """The runs of a task under ``out`` that are not finished."""
+    env_id = env_id_of(task)
+    return [
+        path.parent
+        for path in out.glob(f"*/{RUN_FILE}")
+        if read_json(path).get("env_id") == env_id and not is_finished(path.parent)
+    ]
+
+
+def is_finished(folder: Path) -> bool:
+    """Whether a run has been trained and judged."""
+    return (folder / EVALUATION_FILE).exists() and (folder / CARD_FILE).exists()
 
 
 def read_run(folder: Path) -> Training:
@@ -224,10 +242,6 @@ def run(folder: Path, *, progress: bool = True, report: Report | None = None) ->
     return Result(folder, trained.policy, rows)
 
 
-def _is_finished(folder: Path) -> bool:
-    return (folder / EVALUATION_FILE).exists() and (folder / CARD_FILE).exists()
-
-
 def _judged_agents(training: Training, policy: Policy) -> dict[str, Agent]:
     """The trained policy beside the quick agents that need no training and know the task."""
     request = AgentRequest(training.env_id, training.options, seed=training.seed)
@@ -274,10 +288,27 @@ def _write_statistics(folder: Path, policy: Policy) -> None:
     )
 
 
+def read_log(folder: Path) -> TrainingLog:
+    """The episodes of a finished run, or ``ValueError``."""
+    path = folder / LOG_FILE
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            header, *lines = csv.reader(file)
+        if tuple(header) != _LOG_COLUMNS:
+            raise ValueError(f"its columns must be {', '.join(_LOG_COLUMNS)}")
+        columns = list(zip(*lines, strict=True)) if lines else [()] * len(_LOG_COLUMNS)
+        steps, returns, lengths, survived = (np.array(column, dtype=float) for column in columns)
+        seconds = float(read_json(folder / CARD_FILE)["training"]["seconds"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"no episodes can be read from {str(path)!r}: {error}") from error
+    counts = (steps.astype(np.int64), returns, lengths.astype(np.int64), survived > 0.0)
+    return TrainingLog(*counts, seconds)
+
+
 def _write_log(folder: Path, log: TrainingLog) -> None:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("steps", "return", "length", "survived"))
+    writer.writerow(_LOG_COLUMNS)
     writer.writerows(
         zip(
             log.steps.tolist(),

@@ -1,0 +1,172 @@
+"""Several seeds of one training: which seeds, going on with what is unfinished, and what the picture and table are of."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import train
+from agents.learning import series
+from agents.learning.curves import running_means
+from agents.learning.processes import RunError, run_side_by_side
+from agents.learning.results import TrainingLog
+from agents.learning.series import (
+    new_series,
+    parse_seeds,
+    resumed,
+    run_series,
+    runs_of,
+    spread_table,
+)
+from agents.learning.ship import main as ship_main
+from agents.learning.training import is_finished, read_log, started_run
+from agents.policies import storage
+from agents.registry import newest_policy
+
+# the least that PPO's own settings for the task allow: one update
+TINY = {"steps": 4096, "episodes": 2, "checkpoint_seconds": 0.0}
+
+
+def ended(folder: Path) -> None:
+    """A run that looks finished: another's results stand in."""
+    for name in ("policy.json", "evaluation.json"):
+        (folder / name).write_text("[]")
+
+
+@pytest.mark.parametrize(
+    ("text", "seeds"),
+    [("5", (0, 1, 2, 3, 4)), ("0-4", (0, 1, 2, 3, 4)), ("0,3,7", (0, 3, 7)), ("2-3, 9", (2, 3, 9)), ("4-4", (4,))],
+)  # fmt: skip
+def test_seeds_are_a_number_of_them_ranges_or_a_list(text, seeds):
+    assert parse_seeds(text) == seeds
+
+
+@pytest.mark.parametrize(
+    "text", ["", "0", "-1", "3-1", "1,1", "a", "0-", "999999999", "1.5", "1,,2"]
+)
+def test_other_words_for_seeds_are_refused(text):
+    with pytest.raises(ValueError, match="seeds must be as 5"):
+        parse_seeds(text)
+
+
+def log_of(steps: list[int], returns: list[float]) -> TrainingLog:
+    n = len(steps)
+    return TrainingLog(
+        np.array(steps), np.array(returns), np.ones(n, dtype=np.int64), np.ones(n, dtype=bool), 1.0
+    )
+
+
+def test_curves_of_steady_trainings_are_their_returns_where_all_have_some():
+    short = log_of(list(range(100, 1100, 100)), [3.0] * 10)
+    longer = log_of(list(range(300, 2300, 100)), [5.0] * 20)
+    steps, means = running_means([short, longer])
+    # windows of two episodes: the second episode of the later, and the last of the earlier
+    assert (steps[0], steps[-1]) == (400, 1000)
+    assert means == pytest.approx(np.array([[3.0], [5.0]]) * np.ones(len(steps)))  # rounding
+    steps, means = running_means([short, log_of([], [])])
+    assert means.shape == (2, 0)
+
+
+def test_a_series_goes_on_with_what_is_unfinished_and_gathers_its_seeds(tmp_path, monkeypatch):
+    folder = new_series("Walk", [0, 3], tmp_path, TINY)
+    original, trained = series.run, []
+
+    def interrupted(place: Path, **keywords):
+        if trained:
+            raise KeyboardInterrupt
+        trained.append(place.name)
+        return original(place, **keywords)
+
+    monkeypatch.setattr(series, "run", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_series(folder, progress=False)
+    monkeypatch.setattr(series, "run", original)
+    runs = runs_of(folder)
+    assert [is_finished(place) for place in runs.values()] == [True, False]
+    assert resumed("Walk", tmp_path) == folder
+    before = (runs[0] / "policy.safetensors").stat().st_mtime_ns
+    result = run_series(folder, progress=False)
+    assert (runs[0] / "policy.safetensors").stat().st_mtime_ns == before  # not trained again
+    with pytest.raises(ValueError, match="is finished"):
+        resumed("Walk", tmp_path, folder)
+    means = [
+        row["mean"]
+        for place in runs.values()
+        for row in json.loads((place / "evaluation.json").read_text())
+        if (row["agent"], row["metric"]) == ("ppo", "return")
+    ]
+    own = next(spread for spread in result.spreads if spread.metric == "return")
+    assert own.seeds == (0, 3)
+    assert list(own.means) == means
+    assert own.median == pytest.approx(np.mean(means))  # of two; rounding
+    assert {"random", "fixed"} <= set(result.others["return"])
+    assert spread_table(result).row_count == len(result.spreads)
+    with (folder / "seeds.csv").open() as file:
+        assert next(csv.reader(file)) == ["metric", "median", "lowest", "highest", "seed0", "seed3"]
+    assert (folder / "learning_curves.png").stat().st_size > 0
+    assert newest_policy("LeanYaw/Walk-v0", tmp_path) == runs[3]
+    monkeypatch.setattr(storage, "SHIPPED", tmp_path / "trained")
+    ship_main([folder])
+    assert storage.shipped_seeds("LeanYaw/Walk-v0") == [0, 3]
+
+
+def test_the_newest_of_runs_and_series_is_gone_on_with(tmp_path):
+    run_folder = started_run("Walk", tmp_path, None, TINY)
+    folder = new_series("Walk", [0], tmp_path, TINY)
+    for age, path in enumerate([folder / "series.json", run_folder / "run.json"]):
+        os.utime(path, (1000.0 + age, 1000.0 + age))
+    assert resumed("Walk", tmp_path) == run_folder
+    ended(run_folder)
+    assert resumed("Walk", tmp_path) == folder
+    with pytest.raises(ValueError, match="leave out seeds"):
+        resumed("Walk", tmp_path, folder, {"seeds": "0-1"})
+    with pytest.raises(ValueError, match="no unfinished training of Heading"):
+        resumed("Heading", tmp_path)
+
+
+def test_runs_side_by_side_finish_and_one_that_fails_is_named(tmp_path):
+    folder = new_series("Walk", [0, 1], tmp_path, TINY)
+    runs = list(runs_of(folder).values())
+    (runs[1] / "checkpoint.safetensors").write_bytes(b"nothing of the kind")
+    with pytest.raises(RunError, match="seed1"):
+        run_side_by_side(runs[1:], 2, progress=False)
+    (runs[1] / "checkpoint.safetensors").unlink()
+    run_side_by_side(runs, 2, progress=False)
+    assert all(is_finished(place) for place in runs)
+    assert all(read_log(place).seconds > 0.0 for place in runs)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--seeds", "x"], "seeds must be as 5"),
+        (["--seeds", "2", "--seed", "1"], "seeds must not be given together with"),
+        (["--seeds", "2", "--steps", "0"], "steps must be in"),
+        (["--algorithm", "dqn"], "algorithm must be one of"),
+        (["--resume", "--seeds", "2"], "leave out seeds"),
+        (["--jobs", "0"], "--jobs"),
+    ],
+)
+def test_bad_series_are_refused_before_anything_is_written(tmp_path, arguments, message):
+    result = CliRunner().invoke(train.app, [*arguments, "--out", str(tmp_path)], env={"COLUMNS": "400"})  # fmt: skip
+    assert result.exit_code == 2
+    assert message in result.output
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_line_trains_several_seeds(tmp_path):
+    arguments = ["--task", "Walk", "--seeds", "2", "--steps", "4096", "--episodes", "2", "--out", str(tmp_path)]  # fmt: skip
+    result = CliRunner().invoke(train.app, arguments, env={"COLUMNS": "400"})
+    assert result.exit_code == 0, result.output
+    assert "median" in result.output
+    assert "fixed" in result.output
+    (folder,) = tmp_path.iterdir()
+    again = CliRunner().invoke(train.app, ["--resume", "--run", str(folder), "--task", "Walk"], env={"COLUMNS": "400"})  # fmt: skip
+    assert again.exit_code == 2
+    assert "is finished" in again.output
