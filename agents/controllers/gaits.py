@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import root
 
 from agents.controllers.regulator import LinearStep, linearise_step
@@ -21,8 +22,6 @@ from lean_yaw_env.walker import Walker
 ANGLES = tuple(np.linspace(0.15, 0.45, 13).tolist())
 DOWNHILL_HEADINGS = tuple(np.linspace(-0.7, 0.7, 9).tolist())
 ALL_HEADINGS = tuple(np.linspace(-math.pi, math.pi, 17).tolist())
-
-Number = TypeVar("Number", float, Vector)
 
 
 @dataclass(frozen=True)
@@ -43,10 +42,12 @@ class Pumping:
         require_number("pumping downhill", self.downhill, 0.0, 0.1)
         require_number("pumping uphill", self.uphill, 0.0, 0.1)
 
-    def along(self, heading: Number) -> Number:
-        """The offset for a heading, or an array of them, from downhill."""
-        up = 0.5 * (1.0 - np.cos(heading)) if self.uphill else 0.0 * heading
-        return self.downhill + up * (self.uphill - self.downhill)
+    def along(self, headings: ArrayLike) -> Vector:
+        """The offsets for headings from downhill, of any shape."""
+        headings = np.asarray(headings, dtype=float)
+        if not self.uphill:
+            return np.full(headings.shape, self.downhill)
+        return self.downhill + 0.5 * (1.0 - np.cos(headings)) * (self.uphill - self.downhill)
 
 
 @dataclass(frozen=True)
@@ -96,41 +97,56 @@ class _GaitGrid:
         self._headings = headings_of(parameters, pumping)
 
     def nodes(self, start: Vector) -> list[list[GaitNode]]:
-        """Gaits of the grid, each followed from its neighbour; where one is lost, its neighbour stands for it."""
-        rows: dict[int, list[GaitNode]] = {}
+        """Gaits of the grid, each followed from its neighbour; where one is lost, its neighbour stands for all beyond it."""
         middle = int(np.argmin(np.abs(np.array(ANGLES) - INTER_LEG_ANGLE)))
         straight = self._solve(ANGLES[middle], 0.0, start, 0.0)
-        for way in (range(middle, -1, -1), range(middle, len(ANGLES))):
-            seed = straight
-            for i in way:
-                seed = self._followed(seed, ANGLES[i], 0.0)
-                rows[i] = self._row(ANGLES[i], seed)
-        return [rows[i] for i in range(len(ANGLES))]
+        row = self._row(straight)
+        shorter = self._rows(straight, row, ANGLES[middle - 1 :: -1])
+        longer = self._rows(straight, row, ANGLES[middle + 1 :])
+        return [*shorter[::-1], row, *longer]
 
-    def _row(self, angle: float, straight: GaitNode) -> list[GaitNode]:
+    def _rows(
+        self, straight: GaitNode, row: list[GaitNode], angles: Sequence[float]
+    ) -> list[list[GaitNode]]:
+        """Rows of gaits along all headings at inter-leg angles ever farther from a straight gait's."""
+        rows: list[list[GaitNode]] = []
+        for angle in angles:
+            followed = self._followed(straight, angle, 0.0)
+            if followed is None:
+                return rows + [row] * (len(angles) - len(rows))
+            straight, row = followed, self._row(followed)
+            rows.append(row)
+        return rows
+
+    def _row(self, straight: GaitNode) -> list[GaitNode]:
         if not self._has_downhill:
             return [straight] * len(self._headings)
         half = len(self._headings) // 2
-        sides: list[list[GaitNode]] = []
-        for headings in (self._headings[half - 1 :: -1], self._headings[half + 1 :]):
-            side, node = [], straight
-            for heading in headings:
-                node = self._followed(node, angle, heading)
-                side.append(node)
-            sides.append(side)
-        return [*sides[0][::-1], straight, *sides[1]]
+        right = self._side(straight, self._headings[half - 1 :: -1])
+        return [*right[::-1], straight, *self._side(straight, self._headings[half + 1 :])]
 
-    def _followed(self, seed: GaitNode, angle: float, heading: float) -> GaitNode:
+    def _side(self, node: GaitNode, headings: Sequence[float]) -> list[GaitNode]:
+        """Gaits along headings ever farther to one side."""
+        side: list[GaitNode] = []
+        for heading in headings:
+            followed = self._followed(node, node.inter_leg_angle, heading)
+            if followed is None:
+                return side + [node] * (len(headings) - len(side))
+            node = followed
+            side.append(node)
+        return side
+
+    def _followed(self, seed: GaitNode, angle: float, heading: float) -> GaitNode | None:
         start = seed.state.copy()
         start[0] += heading
         try:
             return self._solve(angle, heading, start, seed.held_offset)
         except NoGaitError:
-            return seed
+            return None
 
     def _solve(self, angle: float, heading: float, start: Vector, held: float) -> GaitNode:
         """The gait that repeats at this heading, and the offset that holds it."""
-        aside = self._pumping.along(heading) if self._has_downhill else self._pumping.downhill
+        aside = float(self._pumping.along(heading if self._has_downhill else 0.0))
         two_steps = ActiveMap(self._walker, angle, (held + aside, held - aside), 2)
         if self._has_downhill:
             two_steps, state = _held_gait(two_steps, start)
@@ -176,7 +192,7 @@ def _held_gait(two_steps: ActiveMap, start: Vector) -> tuple[ActiveMap, Vector]:
 
     guess = np.array([two_steps.value("mass_offset"), *start[1:]])
     try:
-        found = root(change, guess, jac=slope, options={"xtol": 1e-15}).x
+        found = root(change, guess, jac=slope, options={"xtol": 1e-12}).x
         residual = float(np.abs(change(found)).max())
     except (LeanYawError, ValueError, np.linalg.LinAlgError) as error:
         raise NoGaitError(str(error)) from error
@@ -186,9 +202,7 @@ def _held_gait(two_steps: ActiveMap, start: Vector) -> tuple[ActiveMap, Vector]:
 
 
 @lru_cache(maxsize=64)
-def gait_nodes(
-    parameters: WalkerParameters, pumping: Pumping
-) -> tuple[tuple[GaitNode, ...], ...]:
+def gait_nodes(parameters: WalkerParameters, pumping: Pumping) -> tuple[tuple[GaitNode, ...], ...]:
     """Gaits and linear steps over ``ANGLES`` and the family's headings.
 
     Raises

@@ -13,6 +13,7 @@ from agents.controllers.lqr import HeadingLqr, LqrLoop, LqrSettings, UprightLqr
 from agents.controllers.tuned import tuned
 from agents.observations import ObservationLayout
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.envs.transition import OFFSET_SCALE
 from lean_yaw_env.parameters import Vector
 
 _PREVIEW = "preview_"
@@ -127,15 +128,21 @@ class WaypointSettings:
     radius : leg lengths
         Of the turn that can be relied on. A goal within that turn's circle is not turned to, which would be orbiting it; the walker
         goes straight on until it can.
+    persistence : rad
+        How far beyond half a turn the walker turns on in the direction that the largest offset turns it to, rather than turn round; in
+        proportion for smaller offsets. To lean over to the other side takes twenty steps.
     loop : LqrSettings
     """
 
     radius: float = 4.1
+    persistence: float = 0.0
     loop: LqrSettings = field(default_factory=LqrSettings)
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.radius < math.inf:
             raise ValueError(f"radius must be in [0, inf), not {self.radius!r}")
+        if not 0.0 <= self.persistence <= math.pi:
+            raise ValueError(f"persistence must be in [0, pi], not {self.persistence!r}")
 
 
 class WaypointGuidance:
@@ -165,9 +172,7 @@ class WaypointGuidance:
     ) -> None:
         chosen = EnvOptions() if options is None else options
         _require(task, chosen, ("goal_bearing", "goal_distance"))
-        self._settings = (
-            tuned("lqr", task, WaypointSettings()) if settings is None else settings
-        )
+        self._settings = tuned("lqr", task, WaypointSettings()) if settings is None else settings
         self._loop = LqrLoop(task, chosen, self._settings.loop)
 
     def predict(
@@ -184,8 +189,15 @@ class WaypointGuidance:
         distance = layout.quantity(seen, "goal_distance")
         # a circle through here along the heading and through the goal has this radius: distance / (2 sin(bearing))
         can_turn = distance >= 2.0 * self._settings.radius * np.abs(np.sin(bearing))
-        error = np.where(can_turn, bearing, 0.0)
+        error = np.where(can_turn, self._shortest_turn(seen, bearing), 0.0)
         return self._loop.actions(seen, error), None
+
+    def _shortest_turn(self, seen: NDArray[np.float32], bearing: Vector) -> Vector:
+        """The turn to a bearing on the side that the walker leans to, unless that is longer by more than leaning over is worth."""
+        # an offset to the right (positive) turns to the right (negative)
+        lean = np.clip(-self._loop.layout.quantity(seen, "mass_offset") / OFFSET_SCALE, -1.0, 1.0)
+        preferred = self._settings.persistence * lean
+        return preferred + _wrapped(bearing - preferred)
 
 
 def _require(task: str, options: EnvOptions, needs: tuple[str, ...]) -> None:
@@ -197,7 +209,14 @@ def _require(task: str, options: EnvOptions, needs: tuple[str, ...]) -> None:
             )
 
 
-def guided(task: str, options: EnvOptions) -> HeadingLqr | PathGuidance | UprightLqr | WaypointGuidance:
+def _wrapped(angle: Vector) -> Vector:
+    """An angle's equal within half a turn."""
+    return angle - 2.0 * math.pi * np.round(angle / (2.0 * math.pi))
+
+
+def guided(
+    task: str, options: EnvOptions
+) -> HeadingLqr | PathGuidance | UprightLqr | WaypointGuidance:
     """The regulator with the guidance that a task's observations call for.
 
     Raises

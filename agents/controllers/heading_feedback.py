@@ -134,13 +134,13 @@ class HeadingFeedback:
         ankle = layout.quantity(seen, "ankle_angle") - side * self._gait_ankle
         ankle_rate = layout.quantity(seen, "ankle_rate") - side * self._gait_ankle_rate
         holding = -self._tangent * np.sin(heading + error)
-        along = heading if self._has_downhill else 0.0 * heading
+        from_downhill = heading if self._has_downhill else np.zeros_like(heading)
         return (
             gains.feedforward * holding
             - gains.proportional * error
             + gains.ankle * ankle
             + gains.ankle_rate * ankle_rate
-            + side * gains.pumping.along(along)
+            + side * gains.pumping.along(from_downhill)
         )
 
 

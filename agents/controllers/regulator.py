@@ -111,9 +111,7 @@ def linearise_step(
     return LinearStep(by_state, by_input)
 
 
-def periodic_gains(
-    now: LinearStep, then: LinearStep, weights: LqrWeights
-) -> tuple[Vector, Vector]:
+def periodic_gains(now: LinearStep, then: LinearStep, weights: LqrWeights) -> tuple[Vector, Vector]:
     """The optimal gains (2, 6), input = -gain z, for ``now`` and for ``then`` where the two steps alternate for ever.
 
     The Riccati equation is that of two steps at once; its solution is the cost to go before ``now``, and the one before ``then`` follows

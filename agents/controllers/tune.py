@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import cmaes
@@ -48,10 +48,11 @@ _LOOP = {
     "weights.inter_leg_angle": (0.01, 1.0, True),
     "weights.offset_change": (0.001, 0.3, True),
 }
+_LIMIT = {"largest_error": (0.1, 3.0, True)}
 _TURN = {
     "turning_angle": (0.2, 0.45, False),
     "turning_error": (0.05, 1.0, True),
-    "largest_error": (0.1, 3.0, True),
+    **_LIMIT,
 }
 _ANGLE = {"inter_leg_angle": (0.15, 0.45, False)}
 _PUMPING = {"pumping.downhill": (0.0, 0.045, False)}
@@ -101,14 +102,17 @@ _PUMPED = LqrSettings(
     LqrWeights(
         heading=0.3, ankle_angle=0.1, ankle_rate=0.1, inter_leg_angle=0.1, offset_change=0.05
     ),
+    largest_error=0.4,
     pumping=Pumping(0.02),
 )
 """Where tasks that allow pumping begin."""
+_PUMPED_UPHILL = replace(_PUMPED, pumping=Pumping(0.02, 0.04))
 
 
 def _heading_lqr(task: str, ranges: dict[str, Range]) -> Search:
-    pumps = "pumping.downhill" in ranges
-    start = _PUMPED if pumps else LqrSettings()
+    start = LqrSettings()
+    if "pumping.downhill" in ranges:
+        start = _PUMPED_UPHILL if "pumping.uphill" in ranges else _PUMPED
     return Search(lambda settings: HeadingLqr(task, settings=settings), start, ranges)
 
 
@@ -122,7 +126,7 @@ SEARCHES: dict[tuple[str, str], Search] = {
     ("feedback", "UTurn"): _feedback("UTurn", _STEERING | _PUMPING | _UPHILL),
     ("feedback", "Level"): _feedback("Level", _STEERING | _PUMPING),
     ("lqr", "Heading"): _heading_lqr("Heading", _LOOP | _ANGLE | _TURN),
-    ("lqr", "SpeedHeading"): _heading_lqr("SpeedHeading", _LOOP | {"largest_error": (0.1, 3.0, True)}),  # fmt: skip
+    ("lqr", "SpeedHeading"): _heading_lqr("SpeedHeading", _LOOP | _LIMIT),
     ("lqr", "UTurn"): _heading_lqr("UTurn", _LOOP | _ANGLE | _TURN | _PUMPING | _UPHILL),
     ("lqr", "Level"): _heading_lqr("Level", _LOOP | _ANGLE | _TURN | _PUMPING),
     ("lqr", "Walk"): Search(
@@ -143,7 +147,8 @@ SEARCHES: dict[tuple[str, str], Search] = {
     ("lqr", "Waypoint"): Search(
         lambda settings: WaypointGuidance("Waypoint", settings=settings),
         WaypointSettings(),
-        _loop(_LOOP | _ANGLE | _TURN) | {"radius": (1.0, 8.0, True)},
+        _loop(_LOOP | _ANGLE | _TURN)
+        | {"radius": (1.0, 8.0, True), "persistence": (0.0, 2.0, False)},
     ),
 }
 """What there is to tune, by controller and task."""
@@ -268,9 +273,7 @@ def main(
     if (controller, task) not in SEARCHES:
         known = ", ".join(" ".join(pair) for pair in SEARCHES)
         raise typer.BadParameter(f"there is nothing to tune but {known}")
-    values, best = tune(
-        controller, task, evaluations=evaluations, episodes=episodes, spread=spread
-    )
+    values, best = tune(controller, task, evaluations=evaluations, episodes=episodes, spread=spread)
     typer.echo(f"{controller} {task}: return {best:.2f} with {values}")
 
 
