@@ -155,8 +155,6 @@ def stride(loop: ClosedLoop, state: Vector) -> tuple[Vector, list[Outcome], Vect
     ------
     FellError
         If the walker falls.
-    NoGaitError
-        If a heel strike comes before the masses have arrived at their offset.
     """
     rows = loop.placed(state[None], 1.0)
     states, outcomes, commands = [], [], []
@@ -166,15 +164,11 @@ def stride(loop: ClosedLoop, state: Vector) -> tuple[Vector, list[Outcome], Vect
         if outcome.status != STEPPED:
             fall = FALL_OF_STATUS.get(outcome.status)
             raise FellError(f"the walker fell {fall.value if fall else ''} in step {k + 1}")
-        asked = float(rows.memory[0, c.COMMANDED_OFFSET])
-        if abs(asked - outcome.offset) > _ARRIVED:
-            raise NoGaitError(
-                f"the heel strike after {outcome.duration:.3f} comes before the masses have moved to {asked:g}; "
-                "a shorter shift_time lets them arrive"
-            )
         states.append(loop.states(rows)[0])
         outcomes.append(outcome)
-        commands.append((float(rows.memory[0, c.INTER_LEG_ANGLE]), asked))
+        commands.append(
+            (float(rows.memory[0, c.INTER_LEG_ANGLE]), float(rows.memory[0, c.COMMANDED_OFFSET]))
+        )
     return np.array(states), outcomes, np.array(commands)
 
 
@@ -188,10 +182,10 @@ def stride_jacobian(loop: ClosedLoop, state: Vector) -> tuple[Vector, Vector]:
     """
     matrix, error = np.eye(len(state)), np.zeros((len(state), len(state)))
     feet: tuple[Foot, Foot] = ("left", "right")
-    for foot in feet:
-        step = loop.linearise(state, foot)
+    for foot, before in zip(feet, (state, stride(loop, state)[0][0]), strict=True):
+        step = loop.linearise(before, foot)
         error = np.abs(step.matrix) @ error + step.error @ np.abs(matrix)
-        matrix, state = step.matrix @ matrix, step.state
+        matrix = step.matrix @ matrix
     return matrix, error
 
 

@@ -16,15 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.agent import Agent
-from lean_yaw_env.analysis.stride import differentiate_step
 from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.rows import WalkerRows
 from lean_yaw_env.envs.tasks import heading, speedheading, task_named, waypoint
 from lean_yaw_env.envs.transition import OFFSET_SCALE, STATE_SCALES
-from lean_yaw_env.kernel.records import Command
+from lean_yaw_env.errors import FellError
+from lean_yaw_env.kernel.jacobian import INPUTS, OUTPUTS, step_jacobian
+from lean_yaw_env.kernel.records import STEPPED, Command
 from lean_yaw_env.parameters import STATE_FIELDS, STATE_SIZE, Foot, Vector
-from lean_yaw_env.walker import Walker
+from lean_yaw_env.walker import SIDE, Walker
 
 OFFSET, PREVIOUS_HEADING, EXTRA = STATE_SIZE, STATE_SIZE + 1, STATE_SIZE + 2
 """Where the state holds what the section does not."""
@@ -35,7 +36,7 @@ COARSEST, SIZES = 0.25, 14
 """The differences' largest step, in units of the observation, and how many there are, each half the one before."""
 ROUNDING = 2.0**-24
 """Of a number between a half and one in single precision."""
-_SMALL = 1e-5  # difference for what has no exact derivative, in double precision
+_DURATION, _X, _Z, _OFFSET = (OUTPUTS.index(name) for name in ("duration", "displacement_x", "displacement_z", "offset"))  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -47,23 +48,32 @@ class Extra:
     name : str
     column : of the environment's memory
     scale : of its differences, as large as the observation's
-    after : from the state before, the displacement (2,) with the turn, and the duration, its value after a step
+    row : from the state before, a step's outputs (``kernel.jacobian.OUTPUTS``) and their derivatives (outputs, k + 2) by the state and the
+        two commands, its own derivatives (k + 2,)
     """
 
     name: str
     column: int
     scale: float
-    after: Callable[[Vector, Vector, float], float]
+    row: Callable[[Vector, Vector, Vector], Vector]
 
 
-def _last_speed(state: Vector, moved: Vector, duration: float) -> float:
-    """The advance along the mean heading of the two footprints, over the step's duration; moved: downhill, right, turned."""
-    mean = state[0] + 0.5 * moved[2]
-    return float(moved[0] * math.cos(mean) - moved[1] * math.sin(mean)) / duration
+def _last_speed(state: Vector, outputs: Vector, rows: Vector) -> Vector:
+    """Of the advance along the mean heading of the two footprints, over the step's duration."""
+    duration, x, z = outputs[[_DURATION, _X, _Z]]
+    mean = 0.5 * (state[0] + outputs[0])
+    by_mean = 0.5 * rows[0]
+    by_mean[0] += 0.5
+    cosine, sine = math.cos(mean), math.sin(mean)
+    speed = (x * cosine - z * sine) / duration
+    by_advance = rows[_X] * cosine - rows[_Z] * sine - (x * sine + z * cosine) * by_mean
+    return (by_advance - speed * rows[_DURATION]) / duration
 
 
-def _aside(state: Vector, moved: Vector, duration: float) -> float:
-    return float(state[EXTRA] + moved[1])
+def _aside(state: Vector, outputs: Vector, rows: Vector) -> Vector:
+    found = rows[_Z].copy()
+    found[EXTRA] += 1.0
+    return found
 
 
 EXTRAS = {
@@ -92,17 +102,14 @@ class Commands:
 
 @dataclass(frozen=True)
 class Linearised:
-    """A step of the closed loop with its derivatives.
+    """The derivatives of a step of the closed loop.
 
     Attributes
     ----------
-    state : shape (k,)
-        After it.
     matrix, error : shape (k, k)
         The Jacobian, and a bound of what the differences leave uncertain in it.
     """
 
-    state: Vector
     matrix: Vector
     error: Vector
 
@@ -214,7 +221,7 @@ class ClosedLoop:
         return Commands(values, slopes.T, errors.T)
 
     def linearise(self, state: Vector, foot: Foot) -> Linearised:
-        """A step with its Jacobian, for steps in which the masses arrive at their offset.
+        """A step with its Jacobian.
 
         Raises
         ------
@@ -222,44 +229,38 @@ class ClosedLoop:
             If the walker does not complete the step.
         """
         asked = self.commands(state, foot)
-        angle, offset = asked.values.tolist()
-        command = Command(angle, offset, float(state[OFFSET]))
-        step = differentiate_step(self.walker, state[:STATE_SIZE], foot, command)
         size = len(state)
-        matrix, by_command = np.zeros((size, size)), np.zeros((size, 2))
-        matrix[:STATE_SIZE, :STATE_SIZE] = step.by_state
-        matrix[:STATE_SIZE, OFFSET] = step.by_previous_offset
-        by_command[:STATE_SIZE] = np.column_stack([step.by_inter_leg_angle, step.by_mass_offset])
-        by_command[OFFSET, 1] = 1.0
-        matrix[PREVIOUS_HEADING, 0] = 1.0
-        after = np.array([*step.state, offset, state[0], *np.zeros(size - EXTRA)])
+        outputs, rows = self._exact(state, foot, asked.values)
+        found = np.zeros((size, size + 2))
+        found[:STATE_SIZE] = rows[:STATE_SIZE]
+        found[OFFSET] = rows[_OFFSET]
+        found[PREVIOUS_HEADING, 0] = 1.0
         if self.extra:
-            after[EXTRA], row = self._extra_row(self.extra, state, foot, angle, offset)
-            matrix[EXTRA], by_command[EXTRA] = row[:size], row[size:]
-        return Linearised(
-            after,
-            matrix + by_command @ asked.slopes,
-            np.abs(by_command) @ asked.errors,
-        )
+            found[EXTRA] = self.extra.row(state, outputs, rows)
+        by_state, by_command = found[:, :size], found[:, size:]
+        return Linearised(by_state + by_command @ asked.slopes, np.abs(by_command) @ asked.errors)
 
-    def _extra_row(
-        self, extra: Extra, state: Vector, foot: Foot, angle: float, offset: float
-    ) -> tuple[float, Vector]:
-        """The coordinate after the step, and its derivatives by the state and the two commands."""
-
-        def after(inputs: Vector) -> float:
-            result = self.walker.step(
-                inputs[:STATE_SIZE], stance=foot, inter_leg_angle=float(inputs[-2]),
-                mass_offset=float(inputs[-1]), previous_offset=float(inputs[OFFSET]),
-            )  # fmt: skip
-            return extra.after(
-                inputs, np.append(result.displacement, result.heading_change), result.duration
-            )
-
-        inputs = np.array([*state, angle, offset])
-        nudges = _SMALL * np.eye(len(inputs))
-        row = [(after(inputs + nudge) - after(inputs - nudge)) / (2.0 * _SMALL) for nudge in nudges]
-        return after(inputs), np.array(row)
+    def _exact(self, state: Vector, foot: Foot, command: Vector) -> tuple[Vector, Vector]:
+        """A walking step's outputs, and their exact derivatives (outputs, k + 2) by the state and the two commands."""
+        body = self.walker.parameters.body()
+        given = Command(float(command[0]), float(command[1]), float(state[OFFSET]))
+        after, rows = np.empty(STATE_SIZE), np.empty((len(OUTPUTS), INPUTS))
+        section = state[:STATE_SIZE].tolist()
+        status = step_jacobian(body, given, *section, SIDE[foot], after, rows)
+        if status != STEPPED:
+            raise FellError(f"the walker fell in the step on its {foot} foot")
+        result = self.walker.step(
+            section, stance=foot, inter_leg_angle=given.inter_leg_angle, mass_offset=given.offset,
+            previous_offset=given.offset_before,
+        )  # fmt: skip
+        outputs = np.zeros(len(OUTPUTS))
+        outputs[:STATE_SIZE] = after
+        outputs[[_DURATION, _X, _Z]] = result.duration, *result.displacement
+        wide = np.zeros((len(OUTPUTS), len(state) + 2))
+        wide[:, :STATE_SIZE] = rows[:, :STATE_SIZE]
+        wide[:, OFFSET] = rows[:, 7]
+        wide[:, -2:] = rows[:, 5:7]
+        return outputs, wide
 
     def _commands_at(self, states: Vector, foot: Foot) -> Vector:
         """Inter-leg angles and mass offsets (n, 2) that the environment makes of the agent's actions."""
