@@ -88,6 +88,7 @@ AGENTS: dict[str, AgentEntry] = {
     "feedback": AgentEntry("feedback", _feedback, ("Heading", "SpeedHeading", "UTurn", "Level")),
     "lqr": AgentEntry("feedback", lambda request: guided(task_of(request.env_id), request.options)),
     "ppo": AgentEntry("learned", _trained("ppo")),
+    "sac": AgentEntry("learned", _trained("sac")),
 }
 """Every agent, in the order of tables; a learned one has the name of its algorithm."""
 

@@ -9,6 +9,9 @@ from typing import Any, Protocol
 from agents.learning.ppo import train_ppo
 from agents.learning.ppo_settings import PPOSettings, settings_for
 from agents.learning.results import Trained
+from agents.learning.sac import train_sac
+from agents.learning.sac_settings import SACSettings
+from agents.learning.sac_settings import settings_for as sac_settings_for
 
 
 class Settings(Protocol):
@@ -34,7 +37,10 @@ class Algorithm:
     train: Callable[..., Trained]
 
 
-ALGORITHMS: dict[str, Algorithm] = {"ppo": Algorithm(PPOSettings, settings_for, train_ppo)}
+ALGORITHMS: dict[str, Algorithm] = {
+    "ppo": Algorithm(PPOSettings, settings_for, train_ppo),
+    "sac": Algorithm(SACSettings, sac_settings_for, train_sac),
+}
 """By the names that their policies carry."""
 
 

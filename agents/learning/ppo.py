@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import cast
 
@@ -17,6 +17,7 @@ from agents.learning.keeper import Keeping, learn, torch_threads
 from agents.learning.ppo_settings import PPOSettings
 from agents.learning.results import Report, Trained, TrainingLog
 from agents.learning.rollouts import TimeDiscountedBuffer
+from agents.learning.schedules import Falling
 from agents.observations import ObservationLayout
 from agents.policies.policy import Policy, PolicyCard
 from agents.policies.storage import task_of
@@ -126,7 +127,7 @@ def _make_model(
         n_steps=settings.steps_per_update,
         batch_size=settings.batch_size,
         n_epochs=settings.epochs,
-        learning_rate=_Falling(settings.learning_rate, settings.final_learning_rate),
+        learning_rate=Falling(settings.learning_rate, settings.final_learning_rate),
         gamma=settings.typical_discount,
         gae_lambda=settings.gae_lambda,
         clip_range=settings.clip_range,
@@ -150,14 +151,3 @@ def _make_model(
 
 def _optimizers(model: PPO) -> dict[str, Optimizer]:
     return {"adam": model.policy.optimizer}
-
-
-@dataclass(frozen=True)
-class _Falling:
-    """A learning rate that falls linearly to a share of itself."""
-
-    first: float
-    last_share: float
-
-    def __call__(self, progress_left: float) -> float:
-        return self.first * (self.last_share + (1.0 - self.last_share) * progress_left)

@@ -32,6 +32,8 @@ NORMALISATION_FLOOR = 1e-8
 """Added to an observation's variance, as Stable-Baselines3's ``VecNormalize`` does."""
 NORMALISED_LIMIT = 10.0
 """Bound of a normalised observation, as there."""
+LOG_STD_LIMITS = (np.float32(-20.0), np.float32(2.0))
+"""Bounds of a logarithm of a deviation that a layer gives, as in Stable-Baselines3's SAC."""
 
 
 def require_algorithm(name: str) -> str:
@@ -88,7 +90,8 @@ class Policy:
     weights : float32 arrays by name
         ``layers.<k>.weight`` (outputs, inputs) and ``layers.<k>.bias`` (outputs,) for k = 0, 1, ... The statistics of observations that
         normalise them: ``observation_mean`` and ``observation_variance`` (features,). ``log_std`` (2,), the logarithm of the
-        standard deviation of actions that are drawn.
+        standard deviation of actions that are drawn, before they are kept in bounds; or ``log_std.weight`` and ``log_std.bias``,
+        a layer beside the last that gives it.
     generator : numpy Generator, optional
         Draws actions for ``deterministic=False``; seeded by the card's seed otherwise.
 
@@ -117,19 +120,26 @@ class Policy:
         deterministic: bool = True,
     ) -> tuple[NDArray[np.float32], State]:
         """The network's actions; see ``Agent.predict``. It remembers nothing."""
-        signal = self._normalised(self.card.layout.require(observation))
+        signal = before = self._normalised(self.card.layout.require(observation))
         activate = ACTIVATIONS[self.card.activation]
         for k in range(self.depth):
-            weight, bias = self.weights[f"layers.{k}.weight"], self.weights[f"layers.{k}.bias"]
-            signal = signal @ weight.T + bias
+            before, signal = signal, self._linear(f"layers.{k}", signal)
             if k < self.depth - 1:
                 signal = activate(signal)
         if not deterministic:
-            deviation = np.exp(self.weights["log_std"])
-            signal = signal + deviation * self._generator.standard_normal(
+            signal = signal + np.exp(self._log_std(before)) * self._generator.standard_normal(
                 signal.shape, dtype=np.float32
             )
         return OUTPUTS[self.card.output](signal), None
+
+    def _linear(self, name: str, signal: NDArray[np.float32]) -> NDArray[np.float32]:
+        return signal @ self.weights[f"{name}.weight"].T + self.weights[f"{name}.bias"]
+
+    def _log_std(self, signal: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The logarithm of the actions' deviation: a constant, or a layer beside the last."""
+        if "log_std" in self.weights:
+            return self.weights["log_std"]
+        return np.clip(self._linear("log_std", signal), *LOG_STD_LIMITS)
 
     def _normalised(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         centred = (observation - self.weights["observation_mean"].astype(float)) * self._scale
@@ -138,22 +148,25 @@ class Policy:
 
 def _require_weights(weights: Weights, features: int) -> int:
     """Check names, shapes and values of a network's weights, and return its number of layers."""
-    depth = sum(name.endswith(".weight") for name in weights)
+    depth = sum(name.startswith("layers.") and name.endswith(".weight") for name in weights)
     if depth == 0:
         raise ValueError("weights must hold layers.0.weight, but hold no layer")
     expected: dict[str, tuple[int, ...]] = {
         "observation_mean": (features,),
         "observation_variance": (features,),
-        "log_std": (ACTION_SIZE,),
     }
-    inputs = features
+    inputs = before = features
     for k in range(depth):
         name = f"layers.{k}.weight"
         shape = weights[name].shape if name in weights else ()
         outputs = ACTION_SIZE if k == depth - 1 else (shape[0] if shape else 0)
         expected[name] = (outputs, inputs)
         expected[f"layers.{k}.bias"] = (outputs,)
-        inputs = outputs
+        before, inputs = inputs, outputs
+    if "log_std" in weights:
+        expected["log_std"] = (ACTION_SIZE,)
+    else:
+        expected |= {"log_std.weight": (ACTION_SIZE, before), "log_std.bias": (ACTION_SIZE,)}
     if set(weights) != set(expected):
         raise ValueError(f"weights must be {sorted(expected)}, not {sorted(weights)}")
     for name, shape in expected.items():
