@@ -143,7 +143,8 @@ def save_pushes(reports: Sequence[ClosedLoopReport], path: Path) -> None:
             )  # fmt: skip
         axes.set_title(title, pad=24, fontsize="medium")
     figure.suptitle(f"{reports[0].task}: largest push survived (rad / time unit)")
-    figure.legend(loc="outside right center", frameon=False)
+    if pushed:
+        figure.legend(loc="outside right center", frameon=False)
     _save(figure, path)
 
 
