@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
@@ -29,6 +30,9 @@ SIZE = STATE_SIZE + 1
 _PRIOR = (0.01, 0.03, 0.05, 0.08, 0.03)
 """How far states stray from the gait, heading apart; weighs what the last step's turn is estimated from."""
 
+_NUDGE = 1e-6
+"""For central differences: its square and round-off over it are both some 1e-10."""
+
 
 @dataclass(frozen=True)
 class LqrWeights:
@@ -40,6 +44,8 @@ class LqrWeights:
     stance_pitch_rate, ankle_rate : rad / time unit
     mass_offset, offset_change : leg lengths
     inter_leg_angle : rad
+    speed : leg lengths / time unit
+        Of the step, which the state does not hold: a cost of state and inputs together.
     """
 
     heading: float = 0.08
@@ -49,6 +55,7 @@ class LqrWeights:
     mass_offset: float = math.inf
     inter_leg_angle: float = 0.035
     offset_change: float = 0.016
+    speed: float = math.inf
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -77,10 +84,13 @@ class LinearStep:
     ----------
     by_state : shape (6, 6)
     by_input : shape (6, 2)
+    speed : shape (8,)
+        How the step's speed along the mean heading of its two footprints follows from state and inputs.
     """
 
     by_state: Vector
     by_input: Vector
+    speed: Vector
 
 
 def linearise_step(
@@ -108,7 +118,30 @@ def linearise_step(
     by_input[:STATE_SIZE, 1] = MIRROR * step.by_mass_offset
     # the masses arrive at old offset + change within the step, and the mirror turns their side round
     by_state[-1, -1] = by_input[-1, 1] = -1.0
-    return LinearStep(by_state, by_input)
+    speed = _speed_gradient(
+        walker, state, np.array([before, inter_leg_angle, mass_offset - before])
+    )
+    return LinearStep(by_state, by_input, speed)
+
+
+def _speed_gradient(walker: Walker, state: Vector, others: Vector) -> Vector:
+    """Central differences of a step's speed by the state (5,), and the old offset, the angle and the change of offset (3,)."""
+
+    def speed(point: Vector) -> float:
+        before, angle, change = point[STATE_SIZE:]
+        step = walker.step(
+            point[:STATE_SIZE],
+            inter_leg_angle=angle,
+            mass_offset=before + change,
+            previous_offset=before,
+        )
+        heading = 0.5 * (point[0] + step.state[0])
+        downhill, right = step.displacement
+        return (downhill * math.cos(heading) - right * math.sin(heading)) / step.duration
+
+    middle = np.concatenate([state, others])
+    nudges = _NUDGE * np.eye(len(middle))
+    return np.array([speed(middle + n) - speed(middle - n) for n in nudges]) / (2.0 * _NUDGE)
 
 
 def periodic_gains(now: LinearStep, then: LinearStep, weights: LqrWeights) -> tuple[Vector, Vector]:
@@ -117,22 +150,44 @@ def periodic_gains(now: LinearStep, then: LinearStep, weights: LqrWeights) -> tu
     The Riccati equation is that of two steps at once; its solution is the cost to go before ``now``, and the one before ``then`` follows
     by one step of the recursion.
     """
-    costs, inputs = weights.matrices()
+    first, second = _costs(now, weights), _costs(then, weights)
     a, b = now.by_state, now.by_input
     both = then.by_state @ a
     by_both = np.hstack([then.by_state @ b, then.by_input])
-    state_cost = costs + a.T @ costs @ a
-    cross = np.hstack([a.T @ costs @ b, np.zeros((SIZE, 2))])
-    input_cost = np.block([[inputs + b.T @ costs @ b, np.zeros((2, 2))], [np.zeros((2, 2)), inputs]])  # fmt: skip
+    state_cost = first.state + a.T @ second.state @ a
+    cross = np.hstack([first.cross + a.T @ second.state @ b, a.T @ second.cross])
+    mixed = b.T @ second.cross
+    input_cost = np.block([[first.input + b.T @ second.state @ b, mixed], [mixed.T, second.input]])
     cost_to_go = solve_discrete_are(both, by_both, state_cost, input_cost, s=cross)
-    gain = _gain(then, cost_to_go, inputs)
-    before_then = costs + then.by_state.T @ cost_to_go @ (then.by_state - then.by_input @ gain)
-    return _gain(now, 0.5 * (before_then + before_then.T), inputs), gain
+    gain = _gain(then, cost_to_go, second)
+    a, b = then.by_state, then.by_input
+    before_then = second.state + a.T @ cost_to_go @ (a - b @ gain) - second.cross @ gain
+    return _gain(now, 0.5 * (before_then + before_then.T), first), gain
 
 
-def _gain(step: LinearStep, cost_to_go: Vector, inputs: Vector) -> Vector:
+class _Costs(NamedTuple):
+    """z' state z + 2 z' cross v + v' input v."""
+
+    state: Vector
+    cross: Vector
+    input: Vector
+
+
+def _costs(step: LinearStep, weights: LqrWeights) -> _Costs:
+    state, inputs = weights.matrices()
+    by_state, by_input = step.speed[:SIZE] / weights.speed, step.speed[SIZE:] / weights.speed
+    return _Costs(
+        state + np.outer(by_state, by_state),
+        np.outer(by_state, by_input),
+        inputs + np.outer(by_input, by_input),
+    )
+
+
+def _gain(step: LinearStep, cost_to_go: Vector, costs: _Costs) -> Vector:
     weighed = step.by_input.T @ cost_to_go
-    return np.linalg.solve(inputs + weighed @ step.by_input, weighed @ step.by_state)
+    return np.linalg.solve(
+        costs.input + weighed @ step.by_input, weighed @ step.by_state + costs.cross.T
+    )
 
 
 def last_turn(before: LinearStep, weights: LqrWeights) -> Vector:

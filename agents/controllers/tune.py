@@ -48,6 +48,7 @@ _LOOP = {
     "weights.inter_leg_angle": (0.01, 1.0, True),
     "weights.offset_change": (0.001, 0.3, True),
 }
+_SPEED_COST = {"weights.speed": (0.01, 10.0, True)}
 _LIMIT = {"largest_error": (0.1, 3.0, True)}
 _TURN = {
     "turning_angle": (0.2, 0.45, False),
@@ -126,7 +127,7 @@ SEARCHES: dict[tuple[str, str], Search] = {
     ("feedback", "UTurn"): _feedback("UTurn", _STEERING | _PUMPING | _UPHILL),
     ("feedback", "Level"): _feedback("Level", _STEERING | _PUMPING),
     ("lqr", "Heading"): _heading_lqr("Heading", _LOOP | _ANGLE | _TURN),
-    ("lqr", "SpeedHeading"): _heading_lqr("SpeedHeading", _LOOP | _LIMIT),
+    ("lqr", "SpeedHeading"): _heading_lqr("SpeedHeading", _LOOP | _LIMIT | _SPEED_COST),
     ("lqr", "UTurn"): _heading_lqr("UTurn", _LOOP | _ANGLE | _TURN | _PUMPING | _UPHILL),
     ("lqr", "Level"): _heading_lqr("Level", _LOOP | _ANGLE | _TURN | _PUMPING),
     ("lqr", "Walk"): Search(
