@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import Circle
 from matplotlib.ticker import EngFormatter, MaxNLocator
 
 from agents.agent import Agent
-from agents.evaluation.recording import record_episode
-from agents.evaluation.scoring import Row
+from agents.evaluation.recording import RecordedEpisode, record_episode
+from agents.evaluation.results import RETURN, Row
 from agents.learning.results import TrainingLog
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.rendering.files import written_whole
-from lean_yaw_env.rendering.palette import COMMAND, unit_colour
+from lean_yaw_env.rendering.palette import COMMAND, GOAL, REFERENCE, unit_colour
 from lean_yaw_env.rendering.picture import draw_footprints, new_figure
 
 WINDOW = 128
@@ -25,6 +27,9 @@ WINDOW = 128
 PICTURED_STEPS = 120
 """Steps of an episode that are drawn: two or three commands, at a scale at which footprints can be told apart."""
 _DPI = 150
+_FOOTPRINTS_DPI = 110  # as sharp as a page shows it, and a small file
+_COLUMNS = 5
+_MARGIN = 1.5  # leg lengths around footprints and goals
 _ARROW = 4.0  # leg lengths, of a commanded heading
 _STYLES = {"random": ":", "fixed": "-.", "feedback": "--", "ppo": "-"}
 
@@ -52,7 +57,7 @@ def save_learning_curve(
             log.steps[WINDOW - 1 :], mean, color="tab:blue", label=f"mean of {WINDOW}, exploring"
         )
     for row in rows:
-        if row.metric == "return":
+        if row.metric == RETURN:
             style = _STYLES.get(row.agent, "-")
             axes.axhline(row.mean, color="black", linewidth=1.0, linestyle=style, label=f"{row.agent}, evaluated: {row.mean:.1f}")  # fmt: skip
     axes.xaxis.set_major_formatter(EngFormatter(sep=""))
@@ -76,8 +81,9 @@ def save_agents_footprints(
     seed: int,
     options: EnvOptions | None = None,
 ) -> None:
-    """Draw the first steps of one episode, of an environment's seed, for each agent; arrows show the commanded headings where they
-    were given.
+    """Draw the first steps of one episode, of an environment's seed, for each agent, all to one scale.
+
+    Arrows show commanded headings where they were given, circles goals (full: reached), a broad line the path to be followed.
     """
     episodes = {
         name: record_episode(agent, task, seed=seed, options=options, most_steps=PICTURED_STEPS)
@@ -88,16 +94,58 @@ def save_agents_footprints(
         name if episode.fall is None else f"{name} (fell)": episode
         for name, episode in episodes.items()
     }
-    figure = new_figure(2.4 * len(titled) + 0.8, 8.0)
-    axes = figure.subplots(1, len(titled), sharex=True, sharey=True, squeeze=False)[0]
-    draw_footprints(titled, list(axes), foot_radius=parameters.foot_radius)
-    for place, episode in zip(axes, titled.values(), strict=True):
+    low, high = _extent(list(titled.values()))
+    columns = min(_COLUMNS, len(titled))
+    lines = math.ceil(len(titled) / columns)
+    shape = min(max((high[0] - low[0]) / (high[1] - low[1]), 0.6), 3.0)
+    width = min(2.8, 7.0 / shape)
+    figure = new_figure(width * columns + 0.8, (width * shape + 0.7) * lines + 0.3)
+    axes = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
+    places = list(axes.ravel())
+    for spare in places[len(titled) :]:
+        spare.set_axis_off()
+    draw_footprints(titled, places[: len(titled)], foot_radius=parameters.foot_radius)
+    for place, episode in zip(places, titled.values(), strict=False):
+        _draw_task(place, episode)
+        place.set_xlim(low[1], high[1])
+        place.set_ylim(low[0], high[0])
         place.xaxis.set_major_locator(MaxNLocator(5, integer=True))
-        for step, heading in episode.commands:
-            _draw_command(place, episode.footprints[step], heading)
-    axes[0].set_ylabel("downhill (leg lengths)")
+        place.yaxis.set_major_locator(MaxNLocator(8, integer=True))
+        place.label_outer()
+    for line in axes:
+        line[0].set_ylabel("downhill (leg lengths)")
     with written_whole(path) as temporary:
-        figure.savefig(temporary, dpi=_DPI)
+        figure.savefig(temporary, dpi=_FOOTPRINTS_DPI)
+
+
+def _extent(episodes: Sequence[RecordedEpisode]) -> tuple[Vector, Vector]:
+    """Corners (downhill, right) of what holds every footprint and goal, wide enough to be a picture."""
+    goals = [(goal.downhill, goal.right) for each in episodes for goal in each.goals]
+    points = np.vstack([*(each.footprints for each in episodes), np.reshape(goals, (-1, 2))])
+    low, high = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
+    least = 0.3 * (high - low).max()
+    short = np.maximum(least - (high - low), 0.0)
+    return low - 0.5 * short, high + 0.5 * short
+
+
+def _draw_task(axes: Axes, episode: RecordedEpisode) -> None:
+    """What was asked for: headings, goals, a path."""
+    for step, heading in episode.commands:
+        _draw_command(axes, episode.footprints[step], heading)
+    if episode.reference_path is not None:
+        downhill, right = episode.reference_path.T
+        axes.plot(right, downhill, color=unit_colour(REFERENCE), linewidth=3.0, alpha=0.45, zorder=0.5)  # fmt: skip
+    for goal in episode.goals:
+        colour = unit_colour(GOAL)
+        axes.add_patch(
+            Circle(
+                (goal.right, goal.downhill),
+                goal.radius,
+                facecolor=colour if goal.reached else "none",
+                edgecolor=colour,
+                linewidth=1.5,
+            )
+        )
 
 
 def _draw_command(axes: Axes, footprint: Vector, heading: float) -> None:

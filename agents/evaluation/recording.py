@@ -9,8 +9,10 @@ import numpy as np
 
 from agents.agent import Agent, State
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.envs.tasks import Task
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.parameters import Foot, Vector
+from lean_yaw_env.rendering.scene import Goal
 from lean_yaw_env.walker import Walker
 
 _SAMPLES = 8  # of the centre of mass's path, in each step
@@ -32,6 +34,10 @@ class RecordedEpisode:
     commands : (step, heading) of every commanded heading
         It was given at ``footprints[step]``; rad. Empty for tasks without one.
     fall : the way it fell, or None
+    goals : those reached and, last, the one in force
+        Empty for tasks without goals.
+    reference_path : shape (k, 2), optional
+        The path to be followed: (downhill, right).
     """
 
     footprints: Vector
@@ -40,6 +46,8 @@ class RecordedEpisode:
     path: Vector
     commands: tuple[tuple[int, float], ...]
     fall: str | None
+    goals: tuple[Goal, ...] = ()
+    reference_path: Vector | None = None
 
 
 def record_episode(
@@ -59,6 +67,7 @@ def record_episode(
     walker = Walker(env.rows.parameters)
     observation, info = env.reset(seed=seed)
     infos, paths = [info], []
+    places = [_goal_place(env)]
     state: State = None
     ends = False
     while not ends and len(infos) <= most_steps:
@@ -70,6 +79,8 @@ def record_episode(
         ends = terminated or truncated
         if info["fall"] is None:
             infos.append(info)
+            places.append(_goal_place(env))
+    memory = env.rows.memory[0].copy()
     env.close()
     return RecordedEpisode(
         footprints=np.array([seen["footprint"] for seen in infos]),
@@ -78,7 +89,28 @@ def record_episode(
         path=np.concatenate(paths) if paths else np.empty((0, 4)),
         commands=_commands(infos),
         fall=info["fall"],
+        goals=_goals(places, env.rows.task.goal_radius),
+        reference_path=_reference_path(env.rows.task, memory),
     )
+
+
+def _goal_place(env: WalkerEnv) -> tuple[float, float] | None:
+    columns = env.rows.task.goal_columns
+    if columns is None:
+        return None
+    downhill, right = env.rows.memory[0, list(columns)]
+    return float(downhill), float(right)
+
+
+def _goals(places: list[tuple[float, float] | None], radius: float) -> tuple[Goal, ...]:
+    distinct = [place for place in dict.fromkeys(places) if place is not None]
+    return tuple(
+        Goal(*place, radius, reached=k < len(distinct) - 1) for k, place in enumerate(distinct)
+    )
+
+
+def _reference_path(task: Task, memory: Vector) -> Vector | None:
+    return None if task.reference_path is None else task.reference_path(memory)
 
 
 def _foot(info: dict[str, Any]) -> Foot:

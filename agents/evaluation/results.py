@@ -65,6 +65,12 @@ class Row:
         Policies of as many trainings are pooled; 1 for what is not trained.
     least_training, greatest_training : float
         The lowest and the highest mean of a training.
+    against : str or None
+        The agent it is compared with, on the episodes that both have walked.
+    difference, difference_low, difference_high : float
+        The mean less that agent's, with its 95 % interval; NaN where there is no comparison.
+    verdict : str or None
+        "better", "worse", "tie" or "mixed": see ``claims.Comparison``.
     """
 
     task: str
@@ -81,6 +87,11 @@ class Row:
     trainings: int
     least_training: float
     greatest_training: float
+    against: str | None = None
+    difference: float = float("nan")
+    difference_low: float = float("nan")
+    difference_high: float = float("nan")
+    verdict: str | None = None
 
 
 @dataclass(frozen=True)
@@ -122,20 +133,6 @@ class Results:
         if metric == SURVIVAL:
             return self.survived.astype(float)
         return np.stack([run.metrics[metric] for run in self.runs])
-
-    def first(self, episodes: int) -> Results:
-        """The first of the episodes alone."""
-        return Results(
-            self.task,
-            self.agent,
-            tuple(
-                Episodes(
-                    run.survived[:episodes],
-                    {name: values[:episodes] for name, values in run.metrics.items()},
-                )
-                for run in self.runs
-            ),
-        )
 
 
 def is_share(task: str, metric: str) -> bool:

@@ -162,10 +162,7 @@ HEADING_METRICS = {
         SETTLED_SUM, c.TIME, f"of the time, with an error below {SETTLED} rad", "higher"
     ),
     "mean_settling_time": Metric(
-        SETTLING_SUM,
-        SETTLED_COMMANDS,
-        "from a new command to settled, of commands that got there",
-        "lower",
+        SETTLING_SUM, SETTLED_COMMANDS, "from a new command to settled, of commands that got there"
     ),
     "commands": Metric(COMMANDS, None, "headings commanded so far"),
 }

@@ -1,0 +1,119 @@
+"""Plots of a leaderboard: each task's headline with intervals, and survival against push level."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from agents.evaluation.claims import direction
+from agents.evaluation.push_levels import LevelRow
+from agents.evaluation.results import Row, is_share
+from agents.evaluation.tables import estimate
+from agents.registry import Kind, agent_entry
+from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.rendering.files import written_whole
+from lean_yaw_env.rendering.picture import new_figure
+
+_DPI = 150
+_COLUMNS = 4
+_KIND_COLOURS: dict[Kind, str] = {
+    "baseline": "0.45",
+    "feedback": "tab:blue",
+    "planner": "tab:purple",
+    "learned": "tab:orange",
+}
+_LINES = ("-", "--", "-.", ":")
+_MARKERS = "osD^vP*X"
+
+
+def save_leaderboard_plot(rows: Sequence[Row], path: Path) -> None:
+    """A panel for each task: its headline, an agent to a line."""
+    tasks = list(dict.fromkeys(row.task for row in rows))
+    columns = min(_COLUMNS, len(tasks))
+    lines = math.ceil(len(tasks) / columns)
+    most = max(len({row.agent for row in rows if row.task == task}) for task in tasks)
+    figure = new_figure(3.4 * columns, (0.9 + 0.27 * most) * lines + 0.5)
+    places = figure.subplots(lines, columns, squeeze=False).ravel()
+    for task, axes in zip(tasks, places, strict=False):
+        headline = task_named(task).headline
+        found = [row for row in rows if row.task == task and row.metric == headline]
+        _draw_headline(axes, found, task, headline)
+    for axes in places[len(tasks) :]:
+        axes.set_axis_off()
+    kinds = dict.fromkeys(agent_entry(row.agent).kind for row in rows)
+    handles = [
+        Line2D([], [], color=_KIND_COLOURS[kind], marker="o", linestyle="-", label=kind)
+        for kind in kinds
+    ]
+    handles.append(_key("o", "0.2", "interquartile mean or share, 95 % interval"))
+    handles.append(_key("o", "0.2", "mean", markerfacecolor="none"))
+    handles.append(_key("|", "0.2", "mean of one training"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=2 * columns, fontsize="small", frameon=False)  # fmt: skip
+    with written_whole(path) as temporary:
+        figure.savefig(temporary, dpi=_DPI)
+
+
+def _key(marker: str, colour: str, label: str, **style: str) -> Line2D:
+    return Line2D([], [], color=colour, marker=marker, linestyle="", label=label, **style)
+
+
+def _draw_headline(axes: Axes, rows: Sequence[Row], task: str, headline: str) -> None:
+    share = is_share(task, headline)
+    for place, row in enumerate(rows):
+        colour = _KIND_COLOURS[agent_entry(row.agent).kind]
+        value, low, high = estimate(row, mean=share)
+        axes.plot([low, high], [place, place], color=colour, linewidth=3.0, alpha=0.6, solid_capstyle="butt")  # fmt: skip
+        axes.plot(value, place, "o", color=colour, markersize=5)
+        if not share:
+            axes.plot(row.mean, place, "o", markerfacecolor="none", color=colour, markersize=8)
+        if row.trainings > 1:
+            ends = [row.least_training, row.greatest_training]
+            axes.plot(ends, [place, place], "|", color=colour, markersize=9)
+    axes.set_yticks(range(len(rows)), [row.agent for row in rows])
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    better = "right" if direction(task, headline) > 0 else "left"
+    axes.set_title(task)
+    unit = " (share)" if share else ""
+    axes.set_xlabel(f"{headline.replace('_', ' ')}{unit}, better to the {better}")
+    if share:
+        axes.set_xlim(-0.03, 1.03)
+    elif all(row.low >= 0.0 for row in rows):
+        axes.set_xlim(left=0.0)
+    axes.grid(axis="x", color="0.9")
+    axes.set_axisbelow(True)
+
+
+def save_push_levels_plot(rows: Sequence[LevelRow], path: Path) -> None:
+    """Share of walkers on their feet after 200 steps against push level, with 95 % intervals."""
+    figure = new_figure(6.4, 4.0)
+    axes = figure.subplots()
+    drawn: dict[Kind, int] = {}
+    for k, agent in enumerate(dict.fromkeys(each.row.agent for each in rows)):
+        kind = agent_entry(agent).kind
+        style = _LINES[drawn.get(kind, 0) % len(_LINES)]
+        drawn[kind] = drawn.get(kind, 0) + 1
+        found = sorted(
+            (each for each in rows if each.row.agent == agent), key=lambda each: each.level
+        )
+        levels = [each.level for each in found]
+        colour = _KIND_COLOURS[kind]
+        axes.fill_between(
+            levels, [each.row.low for each in found], [each.row.high for each in found],
+            color=colour, alpha=0.15, linewidth=0.0,
+        )  # fmt: skip
+        shares = [each.row.mean for each in found]
+        axes.plot(levels, shares, style, marker=_MARKERS[k % len(_MARKERS)], color=colour, label=agent, markersize=5)  # fmt: skip
+    axes.set_xlabel(
+        "push level (1: standard deviations 0.08 on the pitch rate, 0.15 on the ankle rate)"
+    )
+    axes.set_ylabel("on their feet after 200 steps")
+    axes.set_ylim(-0.02, 1.02)
+    axes.grid(color="0.9")
+    axes.set_axisbelow(True)
+    figure.legend(loc="outside right center", fontsize="small", frameon=False)
+    with written_whole(path) as temporary:
+        figure.savefig(temporary, dpi=_DPI)
