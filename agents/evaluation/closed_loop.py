@@ -185,7 +185,8 @@ def main(
     else:
         _show(reports, notes)
     if out is not None and reports:
-        said = shlex.join(["python", "-m", "agents.evaluation.closed_loop", *sys.argv[1:]])
+        given = [word for word in sys.argv[1:] if word != "--json"]
+        said = shlex.join(["python", "-m", "agents.evaluation.closed_loop", *given])
         page = write_report(reports, out, said, notes)
         typer.echo(f"written: {page}", err=True)
 

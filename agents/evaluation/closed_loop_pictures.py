@@ -16,14 +16,15 @@ from matplotlib.ticker import MaxNLocator
 from agents.evaluation.closed_loop_gait import GROUPS
 from agents.evaluation.closed_loop_report import ClosedLoopReport
 from agents.evaluation.closed_loop_survival import LargestPushes
+from agents.registry import AGENTS
 from lean_yaw_env.analysis.many_walks import ENDINGS
 from lean_yaw_env.rendering.files import written_whole
 from lean_yaw_env.rendering.palette import INK, STRONG_GRID, unit_colour
 from lean_yaw_env.rendering.picture import new_figure
 
-_DPI = 130
+_DPI = 110
 COLOURS = ("#5b6068", "#d66825", "#256eb2", "#168e68", "#be265c", "#8c6eb4", "#c99414", "#4aa3c7", "#7a4b2a", "#2b2d34")  # fmt: skip
-"""One for each agent, in the order asked for."""
+"""One for each agent, in the order of the registry: an agent keeps its colour from picture to picture."""
 _MARKERS = {"heading": "o", "lean": "^", "pitch": "s", "masses": "D"}
 _ENDING_COLOURS = ("#d8ecd9", "#256eb2", "#d66825", "#8d9197", "#be265c", "#8c6eb4", "#c99414", "#000000")  # fmt: skip
 _WORDS = {
@@ -118,7 +119,8 @@ def save_basins(reports: Sequence[ClosedLoopReport], path: Path) -> None:
         if key in seen
     ]
     handles.append(Line2D([], [], color="black", marker="+", linestyle="", label="the walker's gait"))  # fmt: skip
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
+    columns = len(handles) if len(reports) > 3 else len(reports) + 1
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False)
     _save(figure, path)
 
 
@@ -166,7 +168,12 @@ def _draw_pushes(axes: Any, pushes: LargestPushes, colour: str, label: str | Non
 
 
 def _colours(reports: Sequence[ClosedLoopReport]) -> list[str]:
-    return [COLOURS[k % len(COLOURS)] for k in range(len(reports))]
+    known = list(AGENTS)
+    places = [
+        known.index(report.agent) if report.agent in known else len(known) + k
+        for k, report in enumerate(reports)
+    ]
+    return [COLOURS[place % len(COLOURS)] for place in places]
 
 
 def _ending(key: float) -> str:

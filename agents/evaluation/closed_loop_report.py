@@ -128,7 +128,7 @@ def eigenvalue_text(modes: Sequence[ClosedMode]) -> str:
         shown.append(f"{number} ({mode.about})")
     zeros = sum(abs(mode.eigenvalue) < ZERO for mode in modes)
     neutral = [mode.about for mode in modes if mode.is_neutral]
-    shown += [f"{zeros} of 0"] if zeros else []
+    shown += [f"0 ({zeros} of them)"] if zeros else []
     shown += [f"neutral: 1 ({', '.join(neutral)})"] if neutral else []
     return "; ".join(shown)
 
