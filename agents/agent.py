@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,3 +38,18 @@ class Agent(Protocol):
         actions, shape (..., 2), in [-1, 1], and the new state
         """
         ...
+
+
+@runtime_checkable
+class Planner(Protocol):
+    """An agent that needs the environment itself, to try plans on."""
+
+    def attach(self, env: Any) -> None:
+        """Act in this environment from now on; called before the first ``predict``."""
+        ...
+
+
+def attach(agent: Agent, env: Any) -> None:
+    """Give an agent the environment that it is about to act in, if it needs it."""
+    if isinstance(agent, Planner):
+        agent.attach(env)

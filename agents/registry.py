@@ -10,6 +10,7 @@ from typing import Literal, get_args
 from agents.agent import Agent
 from agents.controllers.guidance import guided
 from agents.controllers.heading_feedback import HeadingFeedback
+from agents.controllers.mpc import MpcController
 from agents.controllers.simple import FixedController, RandomController
 from agents.files import read_json
 from agents.policies.storage import (
@@ -71,6 +72,10 @@ def _feedback(request: AgentRequest) -> Agent:
     return HeadingFeedback(task_of(request.env_id), request.options)
 
 
+def _mpc(request: AgentRequest) -> Agent:
+    return MpcController(task_of(request.env_id), request.options, seed=request.seed)
+
+
 def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
     """Makes an algorithm's trained policy: of the folder asked for, the newest run or the package."""
 
@@ -87,6 +92,7 @@ AGENTS: dict[str, AgentEntry] = {
     "fixed": AgentEntry("baseline", lambda request: FixedController()),
     "feedback": AgentEntry("feedback", _feedback, ("Heading", "SpeedHeading", "UTurn", "Level")),
     "lqr": AgentEntry("feedback", lambda request: guided(task_of(request.env_id), request.options)),
+    "mpc": AgentEntry("planner", _mpc),
     "ppo": AgentEntry("learned", _trained("ppo")),
     "sac": AgentEntry("learned", _trained("sac")),
 }

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.agent import Agent, State
+from agents.agent import Agent, State, attach
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import Task
 from lean_yaw_env.envs.walker_env import WalkerEnv
@@ -66,6 +66,7 @@ def record_episode(
     env = WalkerEnv(task, **vars(chosen))
     walker = Walker(env.rows.parameters)
     observation, info = env.reset(seed=seed)
+    attach(agent, env)
     infos, paths = [info], []
     places = [_goal_place(env)]
     state: State = None

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.agent import Agent, State
+from agents.agent import Agent, State, attach
 from agents.evaluation.results import RETURN, SPEED, Episodes, Results, Row, summary
 from agents.seeds import MOST_EPISODES, evaluation_seed
 from lean_yaw_env.envs import columns as c
@@ -109,6 +109,7 @@ def _run_chunk(
     n = len(seeds)
     env = WalkerVectorEnv(n, task_name, step_info=False, copy=False, **_arguments(chosen))
     observations, _ = env.reset(seed=list(seeds))
+    attach(agent, env)
     ended = np.zeros(n, dtype=np.bool_)
     survived = np.zeros(n, dtype=np.bool_)
     returns = np.zeros(n)

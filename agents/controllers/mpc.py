@@ -1,0 +1,216 @@
+"""Model-predictive control by sampling: at every step plans are tried on the walker itself, and the best one's first step is taken.
+
+The search is the cross-entropy method (Rubinstein 1999; for planning, Kobilarov 2012) around the better of two plans: what was left of the
+last one, and what a base controller would do. It is a yardstick rather than a controller that could be built: see ``Rollouts``
+for what it knows.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from agents.agent import Agent, State
+from agents.controllers.guidance import guided
+from agents.controllers.mpc_rollouts import Rollouts
+from agents.controllers.mpc_settings import SETTINGS, MpcSettings
+from agents.controllers.simple import FixedController
+from lean_yaw_env.envs import columns as c
+from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
+from lean_yaw_env.envs.rows import WalkerRows
+from lean_yaw_env.errors import NoGaitError
+from lean_yaw_env.parameters import Vector, require_number
+
+_TABLES = 16  # of random numbers, one for each step of an episode in turn
+_BLOCK = 4096  # rows walked together: they stay in the processor's cache
+_FLOOR = 0.12  # least spread, as a share of the first: what is found early may still be left
+_DIRECTIONS = 3  # of ``Spread``
+
+
+class HasRows(Protocol):
+    """An environment of walkers: ``WalkerEnv`` or ``WalkerVectorEnv``."""
+
+    rows: WalkerRows
+
+
+class MpcController:
+    """Plans some steps ahead at every step; ``attach`` it to the environment first.
+
+    The same seed makes the same decisions, whatever other walkers the environment has: random numbers depend on the seed and the
+    episode's step alone.
+
+    Parameters
+    ----------
+    task : str
+    options : EnvOptions
+        Those of the environment.
+    settings : MpcSettings, optional
+        Those kept for the task otherwise.
+    seed : int >= 0
+    base : Agent, optional
+        A controller without memory, whose plan is among those tried; the regulator otherwise, or for a walker without a gait the fixed one.
+
+    Raises
+    ------
+    ValueError
+        If the seed is not a whole number from 0 on.
+    """
+
+    def __init__(
+        self,
+        task: str = "Heading",
+        options: EnvOptions | None = None,
+        settings: MpcSettings | None = None,
+        seed: int = 0,
+        base: Agent | None = None,
+    ) -> None:
+        self._task = task
+        self._options = EnvOptions() if options is None else options
+        self._settings = SETTINGS.get(task, MpcSettings()) if settings is None else settings
+        self._seed = int(require_number("seed", seed, 0, 2**63))
+        self._base = _regulator(task, self._options) if base is None else base
+        settings = self._settings
+        steps, knots = np.arange(settings.horizon), np.array(settings.knots)
+        self._steps_of_knots = np.stack(
+            [np.interp(steps, knots, row) for row in np.eye(len(knots))], axis=1
+        )
+        generator = np.random.default_rng((self._seed, 0))
+        self._tables = generator.standard_normal(
+            (_TABLES, settings.iterations, settings.samples, len(knots), _DIRECTIONS)
+        )
+        self._rows: WalkerRows | None = None
+        self._rollouts: Rollouts | None = None
+
+    def attach(self, env: Any) -> None:
+        """Plan for the walkers of this environment from now on.
+
+        Raises
+        ------
+        ValueError
+            If the environment is of another task or other options.
+        """
+        inner: HasRows = getattr(env, "unwrapped", env)
+        rows = inner.rows
+        if rows.task.name != self._task:
+            raise ValueError(f"env must be of task {self._task!r}, not {rows.task.name!r}")
+        if rows.options != self._options:
+            raise ValueError(f"env must have options {self._options}, not {rows.options}")
+        self._rows = rows
+        self._rollouts = Rollouts(rows, self._settings, self._base, self._seed)
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: State = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.float32], State]:
+        """Actions of the best plans found, which are the new state; see ``Agent.predict``.
+
+        Of the observation only the shape is used: the environment is read.
+
+        Raises
+        ------
+        RuntimeError
+            Before ``attach``.
+        ValueError
+            If there is not one observation for each of the environment's walkers.
+        """
+        rows, rollouts = self._rows, self._rollouts
+        if rows is None or rollouts is None:
+            raise RuntimeError("attach(env) must be called before predict: plans are tried on it")
+        shape = np.shape(observation)[:-1]
+        if int(np.prod(shape)) != rows.n or not np.ndim(observation):
+            raise ValueError(
+                f"observation must hold one for each of {rows.n} walkers, not {np.shape(observation)}"
+            )
+        starts = np.ones(rows.n, dtype=np.bool_)
+        left = np.zeros((rows.n, self._settings.horizon, ACTION_SIZE))
+        if state is not None:
+            starts = np.zeros(rows.n, dtype=np.bool_)
+            left = _one_step_on(state[0])
+        if episode_start is not None:
+            starts = starts | np.reshape(episode_start, rows.n)
+        plans = np.empty_like(left)
+        size = max(1, _BLOCK // (self._settings.samples * max(self._settings.scenarios, 1)))
+        for first in range(0, rows.n, size):
+            block = np.arange(first, min(first + size, rows.n))
+            plans[block] = self._search(rollouts, block, left[block], starts[block])
+        actions = plans[:, 0].copy()
+        actions[:, 1] *= rollouts.sides(np.arange(rows.n))
+        return actions.astype(np.float32).reshape(*shape, ACTION_SIZE), (plans,)
+
+    def _search(
+        self, rollouts: Rollouts, block: NDArray[np.int64], left: Vector, starts: NDArray[np.bool_]
+    ) -> Vector:
+        """The best plans found for a block of walkers, (block, horizon, 2)."""
+        settings, each = self._settings, np.arange(len(block))
+        base = rollouts.base_plans(block)
+        centre = np.where(starts[:, None, None], base, left)
+        spread = np.array(list(vars(settings.spread).values()))
+        knots = (len(block), len(settings.knots), _DIRECTIONS)
+        mean, deviation = np.zeros(knots), np.broadcast_to(spread, knots)
+        best, most = base, np.full(len(block), -np.inf)
+        tables = self._tables[self._memory(block, c.STEPS).astype(np.int64) % _TABLES]
+        for iteration in range(settings.iterations):
+            tried = mean[:, None] + deviation[:, None] * tables[:, iteration]
+            tried[:, 0] = mean
+            plans = self._plans(centre, tried, block)
+            if iteration == 0:
+                plans[:, 1] = base
+            worth = rollouts.worth(plans, block) - self._distrust(plans, base)
+            found = worth.argmax(axis=1)
+            better = worth[each, found] > most
+            best = np.where(better[:, None, None], plans[each, found], best)
+            most = np.maximum(most, worth[each, found])
+            mean, deviation = self._narrowed(tried, worth, iteration == 0)
+            deviation = np.maximum(deviation, _FLOOR * spread)
+            if iteration == 0:
+                # what was tried around the plan left says nothing about the base's, if that is where to search on
+                changes = (worth[:, 1] > worth[:, 0])[:, None, None]
+                centre = np.where(changes, base, centre)
+                mean = np.where(changes, 0.0, mean)
+                deviation = np.where(changes, 0.5 * spread, deviation)
+        return best
+
+    def _narrowed(self, tried: Vector, worth: Vector, has_base: bool) -> tuple[Vector, Vector]:
+        """Mean and standard deviation of the best of what was tried; the base's plan was not drawn."""
+        ranked = worth.copy()
+        if has_base:
+            ranked[:, 1] = -np.inf
+        elites = np.argpartition(-ranked, self._settings.elites, axis=1)[:, : self._settings.elites]
+        chosen = np.take_along_axis(tried, elites[:, :, None, None], axis=1)
+        return chosen.mean(axis=1), chosen.std(axis=1)
+
+    def _plans(self, centre: Vector, tried: Vector, block: NDArray[np.int64]) -> Vector:
+        """Plans (block, m, horizon, 2) from deviations at the knots (block, m, knots, 3)."""
+        change = np.einsum("hk,nmkd->nmhd", self._steps_of_knots, tried)
+        feet = np.where(np.arange(self._settings.horizon) % 2 == 0, 1.0, -1.0)
+        stance = self._memory(block, c.SIDE)[:, None, None] * feet
+        plans = np.repeat(centre[:, None], tried.shape[1], axis=1)
+        plans[..., 0] += change[..., 0]
+        plans[..., 1] += change[..., 1] + stance * change[..., 2]
+        return np.clip(plans, -1.0, 1.0)
+
+    def _distrust(self, plans: Vector, base: Vector) -> Vector:
+        if self._settings.trust == 0.0:
+            return np.zeros(plans.shape[:2])
+        return self._settings.trust * np.square(0.5 * (plans - base[:, None])).mean(axis=(2, 3))
+
+    def _memory(self, block: NDArray[np.int64], column: int) -> Vector:
+        assert self._rows is not None
+        return self._rows.memory[block, column]
+
+
+def _one_step_on(plans: Vector) -> Vector:
+    """What is left of plans (n, horizon, 2) a step later; it ends as it did two steps, the same foot, before."""
+    return np.concatenate([plans[:, 1:], plans[:, -2:][:, :1]], axis=1)
+
+
+def _regulator(task: str, options: EnvOptions) -> Agent:
+    try:
+        return guided(task, options)
+    except NoGaitError:
+        return FixedController()

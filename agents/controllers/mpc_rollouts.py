@@ -1,0 +1,165 @@
+"""What plans are worth: many of them walked by the environment's own compiled steps, in rows of memory copied from the episode's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.agent import Agent
+from agents.controllers.mpc_settings import MpcSettings
+from lean_yaw_env.envs import columns as c
+from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
+from lean_yaw_env.envs.rows import WalkerRows
+from lean_yaw_env.kernel.records import FAILED
+from lean_yaw_env.parameters import Vector
+
+_KEYS = 64  # sets of scenarios, one for each step of an episode in turn
+_LARGEST_PUSH = 10.0  # push level that there is
+_OFFSET = 1  # the action that says which way the masses go
+
+
+@dataclass
+class _Account:
+    """Running worth of plans, row by row."""
+
+    worth: Vector
+    start: Vector
+    live: NDArray[np.bool_]
+    rewards: Vector
+    durations: Vector
+    """(2, rows): of the last two steps."""
+
+    @classmethod
+    def at(cls, times: Vector) -> _Account:
+        n = len(times)
+        # the durations are divided by only once there is one
+        return cls(
+            np.zeros(n), times.copy(), np.ones(n, dtype=np.bool_), np.zeros((2, n)), np.full((2, n), 1e-9)
+        )  # fmt: skip
+
+
+class Rollouts:
+    """Walks plans in rows of its own and tells their worth.
+
+    A plan is judged by the reward within a window of time, as the task gives it. It sees the whole state of the episode: the true section
+    state, whatever noise the sensors have; the body; the command and when it runs out; the whole path. It does not see what has yet to be
+    drawn. Without scenarios nobody pushes, and where the task draws something new, a command or a goal, a plan ends; with
+    scenarios, numbers are drawn from keys of its own.
+
+    Parameters
+    ----------
+    rows : WalkerRows
+        Of the environment; read, never changed.
+    settings : MpcSettings
+    base : Agent
+        That remembers nothing; walks the tail.
+    seed : int >= 0
+        Of the scenarios.
+    """
+
+    def __init__(self, rows: WalkerRows, settings: MpcSettings, base: Agent, seed: int) -> None:
+        self._rows = rows
+        self._settings = settings
+        self._base = base
+        task, options = rows.task, rows.options
+        level = task.push_level if options.push_level is None else options.push_level
+        self._quiet = replace(options, push_level=0.0, sensor_noise=0.0, hidden_rates=False)
+        scale = settings.push_scale if settings.scenarios else 0.0
+        self._pushed = replace(self._quiet, push_level=min(scale * level, _LARGEST_PUSH))
+        generator = np.random.default_rng((seed, 1))
+        self._keys = generator.integers(
+            2**64, size=(_KEYS, max(settings.scenarios, 1)), dtype=np.uint64
+        )
+        self._scratch: dict[tuple[int, bool], WalkerRows] = {}
+
+    def sides(self, block: NDArray[np.int64]) -> Vector:
+        """What turns an offset in space into an action and back, (block,): actions of a mirrored environment are as of a left stance."""
+        sides = self._rows.memory[block, c.SIDE]
+        return sides if self._quiet.mirror else np.ones_like(sides)
+
+    def base_plans(self, block: NDArray[np.int64]) -> Vector:
+        """The base controller's actions from here on if nobody pushes, (block, horizon, 2), offsets in space."""
+        n, horizon = len(block), self._settings.horizon
+        rows = self._copied(block, 1, is_pushed=False)
+        plans = np.zeros((n, horizon, ACTION_SIZE))
+        ended = np.zeros(n, dtype=np.bool_)
+        for step in range(horizon):
+            actions = self._base.predict(rows.observations)[0]
+            plans[:, step] = actions
+            plans[:, step, _OFFSET] *= self._signs(rows)
+            rows.actions[:] = actions
+            rows.step_many(ended, 0, n)
+            ended |= rows.terminated | rows.truncated | _failed(rows)
+        return plans
+
+    def worth(self, plans: Vector, block: NDArray[np.int64]) -> Vector:
+        """Worth (block, m) of plans (block, m, horizon, 2), each by itself, in reward."""
+        settings = self._settings
+        n, m = plans.shape[:2]
+        draws = max(settings.scenarios, 1)
+        rows = self._copied(block, m * draws, is_pushed=True)
+        actions = np.repeat(plans.reshape(n * m, settings.horizon, ACTION_SIZE), draws, axis=0)
+        account = _Account.at(rows.memory[:, c.TIME])
+        last = settings.horizon + settings.tail - 1
+        for step in range(last + 1):
+            if step < settings.horizon:
+                rows.actions[:] = actions[:, step]
+                rows.actions[:, _OFFSET] *= self._signs(rows)
+            else:
+                rows.actions[:] = self._base.predict(rows.observations)[0]
+            rows.step_many(~account.live, 0, rows.n)
+            self._settle(rows, account, step, step == last)
+            if not account.live.any():
+                break
+        return account.worth.reshape(n, m, draws).mean(axis=-1)
+
+    def _settle(self, rows: WalkerRows, account: _Account, step: int, is_last: bool) -> None:
+        """Take a step into the account."""
+        settings = self._settings
+        failed = _failed(rows)  # a step that does not converge is as good as a fall
+        falls = account.live & (rows.terminated | failed)
+        walked = account.live & ~failed
+        rewards = rows.rewards - settings.step_price
+        account.worth += np.where(walked, rewards, 0.0) - settings.fall * falls
+        account.rewards[step % 2, walked] = rewards[walked]
+        account.durations[step % 2, walked] = rows.outcomes[walked, c.OUTCOME_DURATION]
+        elapsed = rows.memory[:, c.TIME] - account.start
+        window = np.minimum(settings.window, rows.settings[c.HORIZON] - account.start)
+        ends = (elapsed >= window) | rows.truncated | is_last
+        if not settings.scenarios:
+            ends |= rows.stream[:, 1] > 0  # the task drew something
+        ends &= account.live & ~falls
+        rate = account.rewards.sum(axis=0) / account.durations.sum(axis=0)
+        account.worth += np.where(ends, rate * (window - elapsed), 0.0)
+        account.live &= ~(ends | falls)
+
+    def _copied(self, block: NDArray[np.int64], copies: int, *, is_pushed: bool) -> WalkerRows:
+        """Scratch rows with as many copies of each walker of the block."""
+        n = len(block) * copies
+        options = self._pushed if is_pushed else self._quiet
+        rows = self._scratch.get((n, is_pushed))
+        if rows is None:
+            rows = self._scratch[n, is_pushed] = WalkerRows(self._rows.task, options, n)
+        rows.memory[:] = np.repeat(self._rows.memory[block], copies, axis=0)
+        if len(rows.bodies) > 1:
+            rows.bodies[:] = np.repeat(self._rows.bodies[block], copies, axis=0)
+        keys = self._keys[self._rows.memory[block, c.STEPS].astype(np.int64) % _KEYS]
+        repeats = -(-copies // keys.shape[1])
+        rows.stream[:, 0] = np.tile(keys, (1, repeats))[:, :copies].ravel()
+        rows.stream[:, 1] = 0
+        rows.terminated[:] = rows.truncated[:] = False
+        # shown anew, without noise
+        everyone = np.arange(n)
+        rows.task.start_many(
+            rows.bodies, rows.memory, rows.stream, rows.settings, rows.observations, everyone, False
+        )
+        return rows
+
+    def _signs(self, rows: WalkerRows) -> Vector | float:
+        return rows.memory[:, c.SIDE] if self._quiet.mirror else 1.0
+
+
+def _failed(rows: WalkerRows) -> NDArray[np.bool_]:
+    return rows.outcomes[:, c.OUTCOME_STATUS] == FAILED
