@@ -95,6 +95,7 @@ AGENTS: dict[str, AgentEntry] = {
     "mpc": AgentEntry("planner", _mpc),
     "ppo": AgentEntry("learned", _trained("ppo")),
     "sac": AgentEntry("learned", _trained("sac")),
+    "apg": AgentEntry("learned", _trained("apg")),
 }
 """Every agent, in the order of tables; a learned one has the name of its algorithm."""
 

@@ -6,6 +6,9 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
+from agents.learning.gradient.settings import GradientSettings
+from agents.learning.gradient.settings import settings_for as gradient_settings_for
+from agents.learning.gradient.training import train_gradient
 from agents.learning.ppo import train_ppo
 from agents.learning.ppo_settings import PPOSettings, settings_for
 from agents.learning.results import Trained
@@ -40,6 +43,7 @@ class Algorithm:
 ALGORITHMS: dict[str, Algorithm] = {
     "ppo": Algorithm(PPOSettings, settings_for, train_ppo),
     "sac": Algorithm(SACSettings, sac_settings_for, train_sac),
+    "apg": Algorithm(GradientSettings, gradient_settings_for, train_gradient),
 }
 """By the names that their policies carry."""
 
