@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ from lean_yaw_env.envs.sb3 import WalkerVecEnv
 
 _LOG = "log."
 _LOG_COLUMNS = ("steps", "returns", "lengths", "survived")
-_RECENT = 128  # episodes that the progress bar's mean is of
+_RECENT = 128  # episodes that the mean which is shown and reported is of
 
 
 class TimedBuffer(Protocol):
@@ -44,7 +45,7 @@ class Keeping:
     seconds : least time between two of them
     progress : show a bar
     label : of the bar
-    report : told of the steps done, between updates
+    report : told of the steps done and the latest returns, between updates
     """
 
     total: int
@@ -91,6 +92,11 @@ class Keeper(BaseCallback):
             raise CheckpointError(f"the checkpoint holds no log: {error}") from error
         self._episodes = list(zip(*columns, strict=True))
 
+    def close(self) -> None:
+        """Leave the bar as it is."""
+        if self._bar is not None:
+            self._bar.close()
+
     @property
     def _walkers(self) -> WalkerVecEnv:
         return self.training_env.unwrapped  # pyright: ignore[reportReturnType]
@@ -126,20 +132,17 @@ class Keeper(BaseCallback):
     def _on_training_end(self) -> None:
         self._write()
         self._show(self._keeping.total)
-        if self._bar is not None:
-            self._bar.close()
 
     def _show(self, steps: int) -> None:
         done = min(steps, self._keeping.total)
+        recent = [episode[1] for episode in self._episodes[-_RECENT:]]
+        mean = sum(recent) / len(recent) if recent else math.nan
+        if self._bar is not None:
+            if recent:
+                self._bar.set_postfix({"return": f"{mean:.1f}"}, refresh=False)
+            self._bar.update(done - self._bar.n)
         if self._keeping.report is not None:
-            self._keeping.report(done)
-        if self._bar is None:
-            return
-        if self._episodes:
-            recent = self._episodes[-_RECENT:]
-            mean = sum(episode[1] for episode in recent) / len(recent)
-            self._bar.set_postfix({"return": f"{mean:.1f}"}, refresh=False)
-        self._bar.update(done - self._bar.n)
+            self._keeping.report(done, mean)
 
     def _write(self) -> None:
         if self._keeping.checkpoint is None:
@@ -171,11 +174,14 @@ def learn(
         restore(arrays)
         keeper.restore(arrays)
     left = keeping.total - model.num_timesteps
-    if left > 0:
-        # SB3 counts what is left from where the model is, and so keeps the schedule's end
-        model.learn(left, keeper, reset_num_timesteps=model.num_timesteps == 0)
     assert model.env is not None
-    model.env.close()
+    try:
+        if left > 0:
+            # SB3 counts what is left from where the model is, and so keeps the schedule's end
+            model.learn(left, keeper, reset_num_timesteps=model.num_timesteps == 0)
+    finally:
+        keeper.close()
+        model.env.close()
     return keeper.log()
 
 

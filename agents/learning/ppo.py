@@ -50,7 +50,7 @@ def train_ppo(
     checkpoint_seconds : least time between two of them
     threads : of torch and of the walkers
     progress : show a bar
-    report : told of the steps done, between updates
+    report : told of the steps done and the latest returns, between updates
     tensorboard : folder for TensorBoard's logs; none without
 
     Raises

@@ -82,4 +82,4 @@ def _run_and_tell(folder: Path, sender: Connection) -> None:
     """The whole life of a process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to decide
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that half-written files are removed
-    run(folder, progress=False, report=sender.send)
+    run(folder, progress=False, report=lambda steps, _: sender.send(steps))

@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 
 from agents.policies.policy import Policy
 
-Report = Callable[[int], object]
-"""Told now and then how many environment steps a training has come to."""
+Report = Callable[[int, float], object]
+"""Told now and then how many environment steps a training has come to, and the mean return of its latest episodes, NaN before the first.
+
+What it raises ends the training.
+"""
 
 
 @dataclass(frozen=True)

@@ -212,7 +212,7 @@ def run(folder: Path, *, progress: bool = True, report: Report | None = None) ->
     ----------
     folder : that ``new_run`` made
     progress : show bars
-    report : told of the steps done, between updates
+    report : told of the steps done and the latest returns, between updates
 
     Raises
     ------
