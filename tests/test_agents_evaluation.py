@@ -6,20 +6,14 @@ import json
 
 import numpy as np
 import pytest
-from scipy import stats
 from typer.testing import CliRunner
 
 from agents import FixedController, HeadingFeedback, RandomController
 from agents.evaluate import app
 from agents.evaluation import scoring
-from agents.evaluation.scoring import (
-    evaluate,
-    mean_interval,
-    run_episodes,
-    summary,
-    survival_interval,
-)
-from agents.evaluation.tables import results_table, rows_to_json
+from agents.evaluation.results import Results, Row, summary
+from agents.evaluation.scoring import evaluate, run_episodes
+from agents.evaluation.tables import results_table, rows_to_csv, rows_to_json
 from agents.seeds import (
     EVALUATION_SEEDS,
     MOST_EPISODES,
@@ -78,28 +72,6 @@ def test_another_seed_draws_other_episodes_and_the_same_seed_the_same():
     assert not np.intersect1d(returns[0], returns[2]).size
 
 
-def test_the_bootstrap_interval_is_near_student_s_on_normal_values():
-    values = np.random.default_rng(0).normal(3.0, 2.0, 400)
-    mean, low, high = mean_interval(values)
-    expected = stats.t.interval(0.95, 399, values.mean(), stats.sem(values))
-    assert mean == values.mean()
-    # 2000 resamples place a 2.5 % quantile within some 4 % of the interval's half width
-    half = 0.5 * (expected[1] - expected[0])
-    assert (low, high) == pytest.approx(expected, abs=0.1 * half)
-
-
-def test_undefined_episodes_are_left_out_of_a_mean_and_constant_values_have_no_spread():
-    assert mean_interval(np.array([2.0, np.nan, 2.0])) == (2.0, 2.0, 2.0)
-    assert all(np.isnan(value) for value in mean_interval(np.array([np.nan])))
-
-
-def test_the_interval_of_a_full_survival_still_has_a_width():
-    low, high = survival_interval(np.ones(100, dtype=bool))
-    # Wilson (1927) with all successes: n / (n + z^2)
-    assert low == pytest.approx(100 / (100 + stats.norm.ppf(0.975) ** 2), rel=1e-12)
-    assert high == 1.0
-
-
 def test_settling_is_undefined_where_no_command_was_settled_rather_than_zero():
     results = run_episodes(
         FixedController(), "Heading", episodes=32, options=EnvOptions(horizon=5.0)
@@ -114,7 +86,7 @@ def test_survival_stands_beside_every_metric():
     wild = EnvOptions(horizon=40.0, max_offset_change=0.1)
     results = run_episodes(RandomController(0), "Heading", episodes=16, options=wild)
     assert 0.0 < results.survived.mean() < 1.0
-    rows = summary("Heading", "random", results)
+    rows = summary(Results("Heading", "random", (results,)))
     assert {row.survival for row in rows} == {results.survived.mean()}
     assert rows[-1].metric == "survival"
     assert {row.episodes for row in rows} == {16}
@@ -125,10 +97,15 @@ def test_the_table_and_the_json_hold_every_row():
     rows = evaluate("Heading", agents, episodes=4, options=SHORT)
     plain = json.loads(rows_to_json(rows))
     assert [(row["agent"], row["metric"]) for row in plain] == [(r.agent, r.metric) for r in rows]
-    assert set(plain[0]) == {"task", "agent", "metric", "mean", "low", "high", "survival", "episodes"}  # fmt: skip
+    assert list(plain[0])[:8] == ["task", "agent", "metric", "mean", "low", "high", "survival", "episodes"]  # fmt: skip
+    assert set(plain[0]) == set(Row.__dataclass_fields__)
+    lines = rows_to_csv(rows).splitlines()
+    assert lines[0].split(",") == list(plain[0])
+    assert len(lines) == 1 + len(rows)
     table = results_table(rows)
     assert [column.header for column in table.columns] == ["metric", "fixed", "random"]
-    assert table.row_count == len({row.metric for row in rows})
+    # of the return, the mean has a line of its own
+    assert table.row_count == len({row.metric for row in rows}) + 1
 
 
 def test_the_command_line_takes_agents_one_after_the_other():
@@ -140,10 +117,22 @@ def test_the_command_line_takes_agents_one_after_the_other():
     assert {row["task"] for row in rows} == {"Walk"}
 
 
+def test_tasks_and_agents_may_be_repeated_or_separated_by_commas():
+    arguments = ["--task", "Walk,Push", "--task", "Walk", "--agents", "random,fixed", "--agents", "fixed"]  # fmt: skip
+    short = ["--episodes", "2", "--processes", "1", "--json"]
+    result = CliRunner().invoke(app, [*arguments, *short])
+    assert result.exit_code == 0, result.output
+    rows = json.loads(result.stdout)
+    assert list(dict.fromkeys((row["task"], row["agent"]) for row in rows)) == [
+        ("Walk", "random"), ("Walk", "fixed"), ("Push", "random"), ("Push", "fixed"),
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["--task", "Fly"], "task must be one of"),
+        (["--task", "Walk", "--agents", "feedback"], "feedback is an agent for Heading"),
         (["--agents", "nobody"], "agents must be among"),
         (["--agents", "fixed", "--episodes", "0"], "episodes must be in"),
         (["--agents", "fixed", "--seed", "-1"], "seed must be in"),

@@ -16,7 +16,6 @@ from agents.evaluation.results import Row
 from agents.evaluation.tables import results_tables, rows_to_json
 from agents.policies.storage import task_of
 from agents.registry import (
-    AGENTS,
     AgentRequest,
     agent_entry,
     env_id_of,
@@ -61,7 +60,7 @@ class Evaluation:
     progress: bool = True
 
     def entrants(self, tasks: Sequence[str], names: Sequence[str]) -> list[Entrant]:
-        """Agents of the registry for tasks, in its order; all that there are for a task if none is named.
+        """Agents of the registry for tasks; all that there are for a task, in the registry's order, if none is named.
 
         Of several tasks, an agent that is not for one is left out there; of one task that is an error.
 
@@ -144,13 +143,9 @@ def tasks_in(given: Iterable[str]) -> list[str]:
 
 
 def agents_in(given: Iterable[str]) -> list[str]:
-    """Names of agents in the registry's order; ``all`` stands for all there are for a task, which is none named."""
+    """Names of agents; ``all`` stands for all there are for a task, which is none named."""
     names = names_in(given)
-    if ALL in names:
-        return []
-    return [name for name in AGENTS if name in names] + [
-        name for name in names if name not in AGENTS
-    ]
+    return [] if ALL in names else list(dict.fromkeys(names))
 
 
 def progress_bar(episodes: int, shown: bool) -> tqdm:

@@ -1,0 +1,119 @@
+"""Means, interquartile means and shares with their intervals: what they are of, and that they are as wide as they should be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy import stats
+
+from agents.evaluation.intervals import RESAMPLES, resample, share_estimate
+
+RNG_SEED = 7
+
+
+def normal(trainings: int, episodes: int, spread: float = 0.0) -> np.ndarray:
+    """Values of mean 3 and standard deviation 2 about trainings that differ by ``spread``."""
+    generator = np.random.default_rng(RNG_SEED)
+    level = spread * generator.normal(size=(trainings, 1))
+    return 3.0 + level + 2.0 * generator.normal(size=(trainings, episodes))
+
+
+def width(estimate) -> float:
+    return estimate.high - estimate.low
+
+
+@settings(max_examples=50, deadline=None)
+@given(arrays(float, st.tuples(st.integers(1, 4), st.just(8)), elements=st.floats(-100, 100)))
+def test_the_interquartile_mean_is_scipy_s_trimmed_mean(values):
+    # eight episodes: the quarters cut no value in part, which is all that scipy's knows
+    expected = stats.trim_mean(values, 0.25, axis=None)
+    # sums of at most 32 numbers up to 100, differently ordered
+    assert resample(values).iqm == pytest.approx(expected, abs=1e-11)
+    assert resample(values).mean == pytest.approx(values.mean(), abs=1e-11)
+
+
+def test_the_interquartile_mean_forgives_a_fifth_of_failures_and_the_mean_does_not():
+    values = np.ones((1, 100))
+    values[0, :20] = np.linspace(-50.0, -40.0, 20)
+    drawn = resample(values)
+    assert drawn.iqm == pytest.approx(1.0, rel=1e-12)
+    assert drawn.mean < -5.0
+
+
+def test_the_interval_of_a_mean_is_near_student_s_on_normal_values():
+    values = normal(1, 400)
+    estimate = resample(values).mean_estimate()
+    expected = stats.t.interval(0.95, 399, values.mean(), stats.sem(values, axis=None))
+    # 2000 resamples place a 2.5 % quantile within some 4 % of the interval's half width
+    assert estimate[1:] == pytest.approx(expected, abs=0.05 * (expected[1] - expected[0]))
+
+
+def test_the_interval_of_an_interquartile_mean_covers_the_truth_in_95_percent_of_samples():
+    generator = np.random.default_rng(RNG_SEED)
+    covered = 0
+    for _ in range(200):
+        estimate = resample(generator.normal(size=(1, 40))).iqm_estimate()
+        covered += estimate.low <= 0.0 <= estimate.high
+    # of 200 samples 190 +- 3.1 are covered; four deviations, and percentile intervals of 40 values are a few percent narrow
+    assert 174 <= covered <= 200
+
+
+def test_an_interval_holds_for_another_training_too():
+    one = resample(normal(5, 400)).mean_estimate()
+    apart = resample(normal(5, 400, spread=3.0)).mean_estimate()
+    of_trainings = normal(5, 400, spread=3.0).mean(axis=1)
+    # drawn with replacement, the mean of five has the deviation sqrt(4/5) of their standard error
+    expected = 2.0 * 1.96 * stats.sem(of_trainings) * np.sqrt(0.8)
+    assert width(apart) == pytest.approx(expected, rel=0.2)  # five things have few different draws
+    # where trainings do not differ, drawing both ways counts the noise of each episode up to three times (Owen, 2007, theorem 3)
+    plain = 2.0 * 1.96 * 2.0 / np.sqrt(5 * 400)
+    assert plain < width(one) < 1.1 * np.sqrt(3.0) * plain
+
+
+def test_differences_are_those_of_pairs():
+    easy = normal(1, 200)
+    noise = np.random.default_rng(1).normal(0.0, 0.01, easy.shape)
+    difference = resample(easy + 0.1 + noise, 1).less(resample(easy, 0))
+    assert difference.mean_estimate().value == pytest.approx(0.1, abs=0.01)
+    # episodes differ 200 times as much as the agents do on each
+    assert width(difference.mean_estimate()) < 0.02 * width(resample(easy).mean_estimate())
+    assert difference.iqm_estimate().low > 0.0
+
+
+def test_undefined_episodes_are_left_out_and_constant_values_have_no_spread():
+    assert resample(np.array([[2.0, np.nan, 2.0]])).mean_estimate() == (2.0, 2.0, 2.0)
+    assert np.isnan(resample(np.array([[np.nan]])).iqm_estimate()).all()
+    holed = normal(2, 40)
+    holed[0, ::3] = np.nan
+    drawn = resample(holed)
+    assert drawn.mean == pytest.approx(np.nanmean(holed), rel=1e-12)
+    assert drawn.means.shape == (RESAMPLES,)
+
+
+def test_the_same_values_give_the_same_interval_and_other_streams_draw_other_trainings():
+    values = normal(3, 50, spread=1.0)
+    assert resample(values, 1).mean_estimate() == resample(values, 1).mean_estimate()
+    assert not np.array_equal(resample(values, 1).means, resample(values, 2).means)
+
+
+def test_the_interval_of_a_full_share_still_has_a_width():
+    estimate = share_estimate(np.ones((1, 100), dtype=bool))
+    # Wilson (1927) with all successes: n / (n + z^2)
+    assert estimate.low == pytest.approx(100 / (100 + stats.norm.ppf(0.975) ** 2), rel=1e-12)
+    assert estimate.high == 1.0
+
+
+def test_the_interval_of_a_share_is_as_wide_as_trainings_differ():
+    generator = np.random.default_rng(RNG_SEED)
+    alike = generator.random((4, 400)) < 0.5
+    apart = generator.random((4, 400)) < np.array([[0.1], [0.4], [0.6], [0.9]])
+    assert width(share_estimate(alike)) < 0.15
+    assert width(share_estimate(apart)) > 0.4
+
+
+def test_nothing_to_draw_from_is_refused():
+    with pytest.raises(ValueError, match="one training and one episode"):
+        resample(np.empty((0, 3)))

@@ -1,0 +1,284 @@
+"""The leaderboard: comparisons that mean what they say, episodes kept and found again, and a page with all of it."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from agents import FixedController, RandomController
+from agents.evaluate import app
+from agents.evaluation import agenda
+from agents.evaluation.agenda import Entrant, walk_all
+from agents.evaluation.claims import best_feedback, claims_of, compare, judged_rows, samples_of
+from agents.evaluation.documents import Circumstances, leaderboard_page
+from agents.evaluation.leaderboard import make_leaderboard
+from agents.evaluation.push_levels import LevelRow, level_entrants, level_rows
+from agents.evaluation.recording import record_episode
+from agents.evaluation.reporting import Evaluation
+from agents.evaluation.results import RETURN, SURVIVAL, Episodes, Results, is_share
+from agents.evaluation.scoring import run_episodes
+from agents.registry import AGENTS, KINDS, AgentRequest, make_agent, make_all, names_for
+from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.registration import ENV_IDS, TASK_VERSIONS
+
+SHORT = EnvOptions(horizon=8.0)
+EPISODES = 6
+
+
+def walked(task: str, agent: str, returns: np.ndarray, **metrics: np.ndarray) -> Results:
+    """Results with these values, (trainings, episodes); everything else is one."""
+    names = (RETURN, *task_named(task).metrics)
+    given = {RETURN: returns} | metrics
+    runs = [
+        Episodes(
+            np.ones(returns.shape[1], dtype=bool),
+            {name: given.get(name, np.ones_like(returns))[k] for name in names},
+        )
+        for k in range(len(returns))
+    ]
+    return Results(task, agent, tuple(runs))
+
+
+def returns(mean: float, trainings: int = 1) -> np.ndarray:
+    episodes = np.random.default_rng(0).normal(0.0, 5.0, 60)
+    noise = np.random.default_rng(int(mean)).normal(0.0, 0.2, (trainings, 60))
+    return mean + episodes + noise
+
+
+SAMPLES = samples_of(
+    [
+        walked("Heading", "random", returns(10.0)),
+        walked("Heading", "fixed", returns(12.0)),
+        walked("Heading", "feedback", returns(15.0)),
+        walked("Heading", "lqr", returns(20.0)),
+        walked("Heading", "ppo", returns(21.0, trainings=3)),
+    ]
+)
+
+
+def test_every_task_has_a_headline_with_a_direction():
+    for name in TASK_VERSIONS:
+        task = task_named(name)
+        if task.headline != RETURN:
+            assert task.metrics[task.headline].better is not None
+    assert is_share("Push", "survived_200_steps") and is_share("Walk", SURVIVAL)
+    assert not is_share("Waypoint", "goals")
+
+
+def test_the_best_feedback_controller_is_neither_the_baseline_nor_the_learned():
+    assert best_feedback(SAMPLES) == "lqr"
+    assert best_feedback({"fixed": SAMPLES["fixed"]}) is None
+
+
+def test_a_small_difference_on_the_same_episodes_is_seen_through_their_spread():
+    comparison = compare(SAMPLES["ppo"], SAMPLES["lqr"], RETURN)
+    # episodes spread by 5, agents differ by 1 on each
+    assert comparison.verdict == "better"
+    assert comparison.mean.low > 0.5
+    assert compare(SAMPLES["lqr"], SAMPLES["ppo"], RETURN).verdict == "worse"
+    assert compare(SAMPLES["lqr"], SAMPLES["lqr"], RETURN).verdict == "tie"
+
+
+def test_of_an_error_less_is_better():
+    error = "mean_absolute_heading_error"
+    low, high = (
+        walked("Heading", name, returns(5.0), **{error: value * np.ones((1, 60))})
+        for name, value in (("lqr", 0.1), ("fixed", 0.3))
+    )
+    samples = samples_of([low, high])
+    assert compare(samples["lqr"], samples["fixed"], error).verdict == "better"
+
+
+def test_a_mean_and_an_interquartile_mean_that_disagree_are_called_mixed():
+    steady = walked("Heading", "lqr", np.full((1, 60), 10.0))
+    failing = np.full((1, 60), 10.1)
+    failing[0, :8] = 0.0  # better in most episodes, and falls in some
+    samples = samples_of([steady, walked("Heading", "fixed", failing)])
+    assert compare(samples["fixed"], samples["lqr"], RETURN).verdict == "mixed"
+
+
+def test_an_agent_that_walked_fewer_episodes_is_compared_on_those():
+    few = walked("Heading", "feedback", returns(19.0)[:, :20])
+    samples = samples_of([SAMPLES["lqr"].results, few])
+    comparison = compare(samples["feedback"], samples["lqr"], RETURN)
+    assert comparison.episodes == 20
+    assert comparison.verdict == "worse"
+
+
+def test_rows_say_against_whom_and_leave_undefined_episodes_uncompared():
+    holed = returns(12.0)
+    holed[0, 3] = np.nan
+    results = walked("Heading", "fixed", returns(12.0), settled_fraction=holed)
+    rows = {
+        (row.agent, row.metric): row
+        for row in judged_rows(samples_of([results, SAMPLES["lqr"].results]))
+    }
+    assert rows["fixed", RETURN].against == "lqr"
+    assert rows["fixed", RETURN].verdict == "worse"
+    assert rows["fixed", "settled_fraction"].verdict is None
+    assert rows["fixed", "commands"].verdict is None  # it only describes
+    assert rows["lqr", RETURN].against is None
+
+
+def test_claims_are_random_below_fixed_below_feedback_below_learned():
+    claims = claims_of("Heading", SAMPLES)
+    assert [(claim.worse, claim.better, claim.holds) for claim in claims] == [
+        ("random", "fixed", True), ("fixed", "lqr", True), ("lqr", "ppo", True),
+    ]  # fmt: skip
+    few = {name: SAMPLES[name] for name in ("lqr", "feedback")}
+    assert not any(claim.holds for claim in claims_of("Heading", few))
+
+
+def test_every_agent_has_a_kind_and_is_made_for_its_tasks_alone():
+    for name, entry in AGENTS.items():
+        assert entry.kind in KINDS
+        for env_id in ENV_IDS:
+            task = env_id.partition("/")[2].partition("-")[0]
+            if task not in entry.tasks:
+                with pytest.raises(ValueError, match=f"{name} is an agent for"):
+                    make_agent(name, AgentRequest(env_id, EnvOptions()))
+
+
+def test_learned_agents_are_there_where_a_training_is_found(tmp_path: Path):
+    request = AgentRequest("LeanYaw/Walk-v0", EnvOptions(), path=tmp_path)
+    assert "ppo" in names_for(request)
+    quick = make_all(replace(request, path=None, runs=tmp_path), ("baseline",))
+    assert list(quick) == ["random", "fixed"]
+
+
+def test_episodes_walked_in_parts_are_those_of_one_evaluation(monkeypatch):
+    monkeypatch.setattr(agenda, "_SHARE", 4)
+    found = walk_all([Entrant("Walk", "fixed", EPISODES, SHORT)], seed=3)[0].results
+    whole = run_episodes(FixedController(), "Walk", episodes=EPISODES, seed=3, options=SHORT)
+    for name, values in whole.metrics.items():
+        assert np.array_equal(found.values(name)[0], values)
+
+
+def test_an_interrupted_evaluation_goes_on_and_loses_nothing(tmp_path: Path, monkeypatch):
+    entrants = [Entrant("Walk", name, EPISODES, SHORT) for name in ("fixed", "random")]
+    expected = walk_all(entrants)
+
+    real, calls = agenda.run_seeds, []
+
+    def interrupted(*arguments, **options):
+        calls.append(arguments)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return real(*arguments, **options)
+
+    monkeypatch.setattr(agenda, "run_seeds", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        walk_all(entrants, cache=tmp_path)
+    assert len(list(tmp_path.iterdir())) == 1
+    again = walk_all(entrants, cache=tmp_path)
+    assert len(calls) == 3  # the first agent's are not walked again
+    for one, other in zip(expected, again, strict=True):
+        assert np.array_equal(one.results.values(RETURN), other.results.values(RETURN))
+    assert walk_all(entrants, cache=tmp_path)[0].seconds == again[0].seconds
+    assert len(calls) == 3
+
+
+def test_kept_episodes_are_not_taken_for_other_ones(tmp_path: Path):
+    entrant = Entrant("Walk", "fixed", 2, SHORT)
+    walk_all([entrant], cache=tmp_path)
+    for other in (
+        replace(entrant, episodes=3),
+        replace(entrant, options=EnvOptions(horizon=7.0)),
+        replace(entrant, agent="random"),
+    ):
+        before = len(list(tmp_path.iterdir()))
+        walk_all([other], cache=tmp_path)
+        assert len(list(tmp_path.iterdir())) == before + 1
+    walk_all([entrant], seed=1, cache=tmp_path)
+    assert len(list(tmp_path.iterdir())) == 5
+
+
+def test_a_damaged_file_is_walked_again(tmp_path: Path):
+    entrant = Entrant("Walk", "fixed", 2, SHORT)
+    first = walk_all([entrant], cache=tmp_path)[0]
+    next(tmp_path.iterdir()).write_bytes(b"PK damaged")
+    again = walk_all([entrant], cache=tmp_path)[0]
+    assert np.array_equal(first.results.values(RETURN), again.results.values(RETURN))
+
+
+def test_two_processes_give_the_results_of_one(monkeypatch):
+    monkeypatch.setattr(agenda, "_WORTH_PROCESSES", 2)
+    entrants = [Entrant("Walk", name, 3, SHORT) for name in ("fixed", "random")]
+    for one, two in zip(walk_all(entrants), walk_all(entrants, processes=2), strict=True):
+        assert np.array_equal(one.results.values(RETURN), two.results.values(RETURN))
+
+
+def test_push_levels_are_walked_by_the_agents_of_push_alone():
+    push = Entrant("Push", "fixed", EPISODES, SHORT)
+    entrants = level_entrants([push, Entrant("Walk", "fixed", EPISODES, SHORT)], (0.1, 2.0))
+    assert [each.options.push_level for each in entrants] == [0.1, 2.0]
+    rows = level_rows(walk_all([push, *entrants]))
+    assert [each.level for each in rows] == [task_named("Push").push_level, 0.1, 2.0]
+
+
+def test_a_recorded_episode_keeps_goals_and_path():
+    waypoint = record_episode(FixedController(), "Waypoint", seed=1, most_steps=5)
+    assert not waypoint.goals[-1].reached
+    assert waypoint.goals[0].radius == 0.5
+    slalom = record_episode(FixedController(), "Slalom", seed=1, most_steps=5)
+    assert slalom.reference_path is not None and slalom.reference_path.shape[1] == 2
+    assert not slalom.goals
+    assert record_episode(RandomController(0), "Walk", seed=1, most_steps=5).reference_path is None
+
+
+def test_the_leaderboard_holds_every_agent_and_the_command_that_made_it(tmp_path: Path):
+    evaluation = Evaluation(episodes=4, options=SHORT, cache=tmp_path / "kept", progress=False)
+    tasks, names = ["Walk", "Push"], ["random", "fixed"]
+    rows = make_leaderboard(tasks, names, evaluation, tmp_path / "docs", "make it")
+    page = (tmp_path / "docs" / "leaderboard.md").read_text()
+    assert page.startswith("# Leaderboard\n\nWritten by `make it`")
+    for words in ("## Walk", "## Push", "| random | baseline |", "random < fixed", "0.2 | 0.4"):
+        assert words in page
+    with open(tmp_path / "docs" / "leaderboard.csv", newline="") as file:
+        assert len(list(csv.DictReader(file))) == len(rows)
+    images = {path.name for path in (tmp_path / "docs" / "images").iterdir()}
+    assert images == {"leaderboard.png", "push_levels.png", "footprints_walk.png", "footprints_push.png"}  # fmt: skip
+
+
+def test_a_page_says_plainly_what_does_not_hold():
+    samples = samples_of(
+        [
+            walked("Heading", "lqr", returns(20.0)),
+            walked("Heading", "ppo", returns(20.0, trainings=2) - 0.001),
+            walked("Heading", "sac", returns(15.0, trainings=2)),
+        ]
+    )
+    made = Circumstances("make it", 0, 60.0, "a machine")
+    page = leaderboard_page(judged_rows(samples), {"Heading": samples}, [], made)
+    assert "no: no difference to lqr is shown" in page
+    assert "no: sac is worse than lqr" in page
+    assert "**ppo** is better than the best feedback controller on no task" in page
+
+
+def test_pictures_alone_are_drawn_by_one_option(tmp_path: Path):
+    arguments = ["--task", "Waypoint", "--agents", "fixed", "--pictures", str(tmp_path)]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    assert [path.name for path in tmp_path.iterdir()] == ["footprints_waypoint.png"]
+
+
+def test_level_rows_are_written_once_for_each_agent_and_level():
+    rows = level_rows(walk_all([Entrant("Push", "fixed", 2, SHORT)]))
+    assert isinstance(rows[0], LevelRow)
+    assert rows[0].row.metric == "survived_200_steps"
+
+
+def test_bad_numbers_and_runs_of_other_episodes_are_refused():
+    with pytest.raises(ValueError, match="episodes must be in"):
+        Entrant("Walk", "fixed", 0, SHORT)
+    with pytest.raises(ValueError, match="processes must be in"):
+        walk_all([], processes=0)
+    one, two = (walked("Walk", "fixed", np.ones((1, n))).runs[0] for n in (2, 3))
+    with pytest.raises(ValueError, match="runs must be one or more of the same episodes"):
+        Results("Walk", "fixed", (one, two))
