@@ -298,7 +298,7 @@ def test_every_environment_has_settings_and_bad_ones_are_refused():
     with pytest.raises(ValueError, match="env_id must be one of"):
         settings_for("CartPole-v1")
     for values, message in [
-        ({"batch_size": 1000}, "batch_size must divide the 16384 samples"),
+        ({"batch_size": 1000}, "batch_size must divide the 32768 samples"),
         ({"walkers": 0}, "walkers must be in"),
         ({"push_level": -1.0}, "push_level must be in"),
         ({"time_constant": 0.0}, "time_constant must be in"),
