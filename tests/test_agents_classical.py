@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_lyapunov
 
-from agents import AgentRequest, HeadingFeedback, make_agent
+from agents import AgentRequest, FixedController, make_agent
+from agents.controllers.gaits import ALL_HEADINGS, ANGLES, Pumping, gait_nodes
 from agents.controllers.guidance import (
     PathGuidance,
     PathSettings,
@@ -19,13 +20,10 @@ from agents.controllers.guidance import (
     guided,
 )
 from agents.controllers.lqr import HeadingLqr, LqrSettings
-from agents.controllers.regulator import (
-    GainSchedule,
-    LqrWeights,
-    last_turn,
-    linearise_step,
-    periodic_gain,
-)
+from agents.controllers.regulator import LqrWeights, last_turn, linearise_step, periodic_gains
+from agents.controllers.schedule import GainSchedule
+from agents.controllers.tune import SEARCHES, Tuner, tune
+from agents.controllers.tuned import all_tuned, with_values
 from agents.evaluation.scoring import run_episodes
 from agents.observations import ObservationLayout
 from lean_yaw_env import Walker, WalkerParameters
@@ -34,13 +32,14 @@ from lean_yaw_env.analysis.limit_cycle import cycle_at, find_gait
 from lean_yaw_env.analysis.section_map import ActiveMap
 from lean_yaw_env.envs.options import EnvOptions, gait_of
 from lean_yaw_env.envs.walker_env import WalkerEnv
+from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.parameters import MIRROR
 
 WEIGHTS = LqrWeights()
 RAW = EnvOptions(mirror=False)
-TASKS = ("Heading", "SpeedHeading", "Slalom", "Waypoint")
+MIDDLE = int(np.argmin(np.abs(np.array(ANGLES) - 0.3)))
+TASKS = ("Heading", "SpeedHeading", "Push", "Slalom", "Waypoint", "Level")
 AGENTS_BY_TASK = {task: guided(task, EnvOptions()) for task in TASKS}
-AGENTS_OF_RAW = {task: guided(task, RAW) for task in TASKS}
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +80,10 @@ def test_feedback_pulls_all_eigenvalues_of_the_stride_inside_those_of_the_open_l
         linearise_step(walker, left, 0.3, offset),
         linearise_step(walker, right, 0.3, -offset),
     )
-    one, other = periodic_gain(now, then, WEIGHTS), periodic_gain(then, now, WEIGHTS)
+    one, other = periodic_gains(now, then, WEIGHTS)
+    again = periodic_gains(then, now, WEIGHTS)
+    # the Riccati equation of the other stride, solved to 1e-10 and better
+    assert np.allclose([other, one], again, rtol=1e-6, atol=1e-8)
     closed = (then.by_state - then.by_input @ other) @ (now.by_state - now.by_input @ one)
     # without feedback the offset stays where it is: the stride of the walker alone
     free = (then.by_state @ now.by_state)[:5, :5]
@@ -94,16 +96,17 @@ def _held_gaits(walker, offset):
     return left, MIRROR * walker.step(left, mass_offset=offset).state
 
 
-def test_the_gain_is_worth_no_less_than_any_near_it(walker, gait):
+@pytest.mark.parametrize("weights", [WEIGHTS, LqrWeights(speed=0.05)])
+def test_the_gain_is_worth_no_less_than_any_near_it(walker, gait, weights):
     step = linearise_step(walker, gait, 0.3, 0.0)
-    gain = periodic_gain(step, step, WEIGHTS)
-    state_cost, input_cost = WEIGHTS.matrices()
+    gain = periodic_gains(step, step, weights)[0]
+    state_cost, input_cost = weights.matrices()
 
     def cost_to_go(feedback):
         closed = step.by_state - step.by_input @ feedback
-        return np.trace(
-            solve_discrete_lyapunov(closed.T, state_cost + feedback.T @ input_cost @ feedback)
-        )
+        speed = (step.speed[:6] - step.speed[6:] @ feedback) / weights.speed
+        cost = state_cost + feedback.T @ input_cost @ feedback + np.outer(speed, speed)
+        return np.trace(solve_discrete_lyapunov(closed.T, cost))
 
     best = cost_to_go(gain)
     rng = np.random.default_rng(0)
@@ -111,6 +114,20 @@ def test_the_gain_is_worth_no_less_than_any_near_it(walker, gait):
         # 2 % of each gain: well above round-off, well within stability
         near = gain * (1.0 + 0.02 * rng.normal(size=gain.shape))
         assert cost_to_go(near) > best
+
+
+def test_gaits_are_as_fast_as_their_linear_steps_say(walker):
+    at = MIDDLE
+    nodes = gait_nodes(walker.parameters, Pumping())
+    shorter, node, longer = (nodes[k][4] for k in (at - 1, at, at + 1))
+    # a gait's step repeats itself: z = (A z + B v), so z = (1 - A)^-1 B v and its speed is that of z and v
+    angle = 0.5 * (ANGLES[at + 1] - ANGLES[at - 1])
+    free = [0, 1, 2, 3, 4]
+    a, b = node.step.by_state[np.ix_(free, free)], node.step.by_input[free, 0]
+    z = np.linalg.solve(np.eye(5) - a, b)
+    slope = node.step.speed[free] @ z + node.step.speed[6]
+    # central difference over 0.025 rad each way of a curve that bends by a tenth of its slope there
+    assert (longer.speed - shorter.speed) / (2.0 * angle) == pytest.approx(slope, rel=0.1)
 
 
 def test_the_last_turn_follows_from_the_state_that_it_left(walker, gait):
@@ -133,18 +150,19 @@ def test_scheduled_speeds_are_those_of_the_angles_they_give(schedule):
     for speed, angle in zip(speeds, angles, strict=True):
         # linear between angles 0.025 apart
         walker = Walker(WalkerParameters())
-        gait = schedule.at(np.array(angle), np.array(0.0))[0]
+        gait = schedule.at(np.array(angle), np.array(0.0)).state
         found = solve_fixed_point(ActiveMap(walker, float(angle)), gait)
         cycle = cycle_at(ActiveMap(walker, float(angle)), found)
         assert cycle.speed == pytest.approx(speed, abs=2e-3)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(numbers=st.lists(st.floats(-2.0, 2.0), min_size=12, max_size=12))
 def test_the_other_foot_is_answered_by_the_mirror_image(numbers):
     odd = ("heading", "ankle_angle", "ankle_rate", "mass_offset", "stance_foot", "heading_error")
     odd += ("cross_track_error", "path_heading_error", "preview", "goal_bearing")
-    for task, agent in AGENTS_OF_RAW.items():
+    for task in TASKS:
+        agent = guided(task, RAW)
         names = ObservationLayout.of(task, RAW).names
         seen = np.array(numbers[: len(names)], dtype=np.float32)
         seen[names.index("stance_foot")] = 1.0
@@ -153,8 +171,8 @@ def test_the_other_foot_is_answered_by_the_mirror_image(numbers):
         assert one == pytest.approx(other * np.array([1.0, -1.0]), abs=1e-5)  # float32
 
 
-@pytest.mark.parametrize("task", ["Heading", "SpeedHeading", "Slalom", "Waypoint"])
-@pytest.mark.parametrize("shape", [(), (3,), (2, 3)])
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("shape", [(), (2, 3)])
 def test_actions_have_the_observations_shape_and_lie_in_the_action_space(task, shape):
     agent = AGENTS_BY_TASK[task]
     width = len(ObservationLayout.of(task, EnvOptions()).names)
@@ -178,29 +196,27 @@ def test_the_gait_itself_is_answered_by_its_own_command():
     assert np.abs(lqr.predict(seen)[0]).max() < 0.02
 
 
-def test_a_commanded_speed_is_walked_where_heading_feedback_ignores_it():
-    regulated = run_episodes(AGENTS_BY_TASK["SpeedHeading"], "SpeedHeading", episodes=48)
-    steered = run_episodes(HeadingFeedback("SpeedHeading"), "SpeedHeading", episodes=48)
-    assert regulated.survived.all()
+@pytest.mark.parametrize(
+    ("task", "metric", "least"),
+    [
+        # means over 1,000 held-out episodes in brackets; 32 episodes stray from them by a tenth or so
+        ("Heading", "settled_fraction", 0.8),  # HEADING
+        ("SpeedHeading", "settled_fraction", 0.7),  # SPEED
+        ("Push", "survived_200_steps", 0.5),  # PUSH
+        ("Waypoint", "goals", 4.0),  # WAYPOINT
+        ("Level", "settled_fraction", 0.75),  # LEVEL
+    ],
+)
+def test_a_task_is_done_as_well_as_measured(task, metric, least):
+    results = run_episodes(AGENTS_BY_TASK[task], task, episodes=32)
+    assert results.metrics[metric].mean() > least
+
+
+def test_a_commanded_speed_is_walked_where_the_paper_has_one_speed():
+    regulated = run_episodes(AGENTS_BY_TASK["SpeedHeading"], "SpeedHeading", episodes=32)
+    fixed = run_episodes(FixedController(), "SpeedHeading", episodes=32)
     error = "mean_absolute_speed_error"
-    # measured over 128 episodes: 0.056 against 0.134
-    assert regulated.metrics[error].mean() < 0.7 * steered.metrics[error].mean()
-    assert regulated.metrics["return"].mean() > steered.metrics["return"].mean()
-
-
-def test_headings_are_reached_as_closely_as_by_tuned_feedback():
-    regulated = run_episodes(AGENTS_BY_TASK["Heading"], "Heading", episodes=48)
-    assert regulated.survived.all()
-    # measured over 128 episodes: 0.055 rad; the paper's fixed controller is 0.30 off
-    assert regulated.metrics["mean_absolute_heading_error"].mean() < 0.07
-
-
-def test_goals_are_reached_and_not_orbited():
-    results = run_episodes(AGENTS_BY_TASK["Waypoint"], "Waypoint", episodes=48)
-    # measured over 48 tuning episodes: 4.8 goals in 300 units of time; pure pursuit reaches 2.8
-    assert results.survived.mean() > 0.9
-    assert results.metrics["goals"].mean() > 3.2
-    assert results.metrics["goals"].min() >= 1.0
+    assert regulated.metrics[error].mean() < 0.8 * fixed.metrics[error].mean()
 
 
 @pytest.mark.parametrize("bearing", [0.5 * math.pi, -0.5 * math.pi])
@@ -224,6 +240,67 @@ def _seen(layout, **quantities):
     values |= dict(zip(state, gait_of(WalkerParameters()), strict=True)) | quantities
     rows = zip(layout.names, layout.centres, layout.scales, strict=True)
     return np.array([(values[name] - c) / s for name, c, s in rows], dtype=np.float32)
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.4, math.pi])
+def test_a_gait_that_pumps_repeats_along_every_heading_of_the_slope(walker, heading):
+    nodes = gait_nodes(walker.parameters, Pumping(0.02, 0.03))
+    column = int(np.argmin(np.abs(np.array(ALL_HEADINGS) - heading)))
+    node = nodes[MIDDLE][column]
+    start = node.state + ALL_HEADINGS[column] * np.eye(5)[0]
+    left, right = node.held_offset + node.pumping, node.held_offset - node.pumping
+    first = walker.step(start, mass_offset=left, previous_offset=right)
+    second = walker.step(
+        first.state, stance="right", mass_offset=right, previous_offset=first.mass_offset
+    )
+    turned = second.state - start
+    # the heading given is that of the mean of two footprints, a gait's own 0.01 rad or so to one side
+    assert np.abs(np.mod(turned[0] + 1.0, 2.0 * math.pi) - 1.0) < 1e-3
+    assert np.abs(turned[1:]).max() < 1e-3
+
+
+def test_feedback_holds_a_gait_that_pumps():
+    walker = Walker(WalkerParameters(slope=0.0))
+    node = gait_nodes(walker.parameters, Pumping(0.03))[MIDDLE][0]
+    gain = periodic_gains(node.step, node.step, WEIGHTS)[0]
+    closed = node.step.by_state - node.step.by_input @ gain
+    assert np.abs(np.linalg.eigvals(closed)).max() < 1.0
+
+
+def test_on_the_level_the_gait_that_pumps_is_answered_by_its_own_command():
+    env = WalkerEnv("Level", start_disturbance=0.0)
+    seen, _ = env.reset(seed=0, options={"command": 0.0})
+    lqr = HeadingLqr("Level", settings=LqrSettings(inter_leg_angle=0.3, pumping=Pumping(0.03)))
+    # the start's mean heading is one footprint's, some 0.01 rad off the gait's
+    assert lqr.predict(seen)[0] == pytest.approx([0.0, 0.6], abs=0.15)
+
+
+def test_what_is_tuned_is_settings_of_controllers_that_are_made():
+    for controller, tasks in all_tuned().items():
+        for task in tasks:
+            agent = make_agent(controller, AgentRequest(f"LeanYaw/{task}-v0", EnvOptions()))
+            width = len(ObservationLayout.of(task, EnvOptions()).names)
+            assert np.abs(agent.predict(np.zeros((2, width)))[0]).max() <= 1.0
+            search = SEARCHES[controller, task]
+            assert set(tasks[task]) <= set(search.ranges)
+
+
+def test_tuning_finds_no_worse_settings_and_the_same_every_time(tmp_path, monkeypatch):
+    file = tmp_path / "tuned.json"
+    file.write_text("{}")
+    monkeypatch.setattr("agents.controllers.tune.FILE", file)
+    before = Tuner("feedback", "Heading", 4)
+    values, best = tune("feedback", "Heading", evaluations=8, episodes=4)
+    assert best >= -before.cost(before.start())
+    assert (values, best) == tune("feedback", "Heading", evaluations=8, episodes=4)
+
+
+def test_a_walker_without_a_gait_gets_no_regulator(monkeypatch):
+    request = AgentRequest("LeanYaw/Level-v0", EnvOptions())
+    monkeypatch.setattr("agents.controllers.tuned.all_tuned", dict)
+    # nothing tuned, so nothing that pumps: on the level there is no gait
+    with pytest.raises(NoGaitError):
+        make_agent("lqr", request)
 
 
 def test_the_registry_makes_them_by_one_name():
@@ -251,5 +328,9 @@ def test_bad_numbers_tasks_and_slopes_are_refused_by_name():
         PathGuidance("Heading")
     with pytest.raises(ValueError, match="task must show goal_bearing"):
         WaypointGuidance("Heading")
-    with pytest.raises(ValueError, match="slope must be above 0"):
-        guided("Level", EnvOptions())
+    with pytest.raises(ValueError, match="pumping downhill must be"):
+        Pumping(-0.01)
+    with pytest.raises(NoGaitError):
+        HeadingLqr("Level", settings=LqrSettings())
+    with pytest.raises(ValueError, match="LqrSettings has no 'speed'"):
+        with_values(LqrSettings(), {"speed": 1.0})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 
@@ -86,7 +87,7 @@ class MpcSettings:
             if not isinstance(value, int) or not low <= value <= high:
                 raise ValueError(f"{name} must be a whole number in [{low}, {high}], not {value!r}")
         knots = self.knots
-        rises = all(a < b for a, b in zip(knots, knots[1:], strict=False))
+        rises = all(a < b for a, b in itertools.pairwise(knots))
         if not knots or knots[0] != 0 or not rises or knots[-1] >= self.horizon:
             raise ValueError(
                 f"knots must increase from 0 to below the horizon {self.horizon}, not {knots!r}"

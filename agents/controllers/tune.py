@@ -144,6 +144,7 @@ SEARCHES: dict[tuple[str, str], Search] = {
         lambda settings: PathGuidance("Slalom", settings=settings),
         PathSettings(),
         _loop(_LOOP | _ANGLE | _TURN) | {"ahead": (0.0, 6.0, False), "approach": (1.0, 30.0, True)},
+        horizon=100.0,
     ),
     ("lqr", "Waypoint"): Search(
         lambda settings: WaypointGuidance("Waypoint", settings=settings),
