@@ -90,10 +90,7 @@ def save_agents_footprints(
         for name, agent in agents.items()
     }
     parameters = (EnvOptions() if options is None else options).walker_parameters(task_named(task))
-    titled = {
-        name if episode.fall is None else f"{name} (fell)": episode
-        for name, episode in episodes.items()
-    }
+    titled = {_title(name, episode): episode for name, episode in episodes.items()}
     low, high = _extent(list(titled.values()))
     columns = min(_COLUMNS, len(titled))
     lines = math.ceil(len(titled) / columns)
@@ -116,6 +113,12 @@ def save_agents_footprints(
         line[0].set_ylabel("downhill (leg lengths)")
     with written_whole(path) as temporary:
         figure.savefig(temporary, dpi=_FOOTPRINTS_DPI)
+
+
+def _title(name: str, episode: RecordedEpisode) -> str:
+    if episode.fall is not None:
+        return f"{name} (fell)"
+    return f"{name} (ended early)" if episode.terminated else name
 
 
 def _extent(episodes: Sequence[RecordedEpisode]) -> tuple[Vector, Vector]:

@@ -34,6 +34,7 @@ class RecordedEpisode:
     commands : (step, heading) of every commanded heading
         It was given at ``footprints[step]``; rad. Empty for tasks without one.
     fall : the way it fell, or None
+    terminated : whether a fall or the task's own end cut it short
     goals : those reached and, last, the one in force
         Empty for tasks without goals.
     reference_path : shape (k, 2), optional
@@ -46,6 +47,7 @@ class RecordedEpisode:
     path: Vector
     commands: tuple[tuple[int, float], ...]
     fall: str | None
+    terminated: bool = False
     goals: tuple[Goal, ...] = ()
     reference_path: Vector | None = None
 
@@ -70,7 +72,7 @@ def record_episode(
     infos, paths = [info], []
     places = [_goal_place(env)]
     state: State = None
-    ends = False
+    terminated = ends = False
     while not ends and len(infos) <= most_steps:
         begins = np.array(len(infos) == 1)
         action, state = agent.predict(observation, state, begins, True)
@@ -90,6 +92,7 @@ def record_episode(
         path=np.concatenate(paths) if paths else np.empty((0, 4)),
         commands=_commands(infos),
         fall=info["fall"],
+        terminated=bool(terminated),
         goals=_goals(places, env.rows.task.goal_radius),
         reference_path=_reference_path(env.rows.task, memory),
     )
