@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.agent import Agent
+from agents.agent import Agent, Planner
 from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.rows import WalkerRows
@@ -136,7 +136,7 @@ class ClosedLoop:
     Raises
     ------
     ValueError
-        If the agent remembers or draws, if the options add noise, delay or random bodies, or a command is not one of the task.
+        If the agent plans, remembers or draws, if the options add noise, delay or random bodies, or a command is not one of the task.
     """
 
     def __init__(
@@ -300,7 +300,11 @@ class ClosedLoop:
         return memory
 
     def _require_one_answer(self) -> None:
-        """Refuse agents that remember or draw: with them the map would be one of more than the state, or of chance."""
+        """Refuse agents that plan, remember or draw: with them the map would be one of more than the state, or of chance."""
+        if isinstance(self.agent, Planner):
+            raise ValueError(
+                "agent must answer from its observation alone, but it plans on the environment"
+            )
         rows = self.placed(np.array([self.start]), 1.0)
         answers = [
             self.agent.predict(rows.observations, None, np.array([k == 0]), True) for k in range(2)

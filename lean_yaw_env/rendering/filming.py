@@ -105,7 +105,7 @@ def film(
     require_number("seconds_per_time_unit", seconds_per_time_unit, 0.0, 100.0, "(]")
     require_number("swing_share", swing_share, 0.0, 1.0)
     is_gif = place.suffix.lower() == ".gif"
-    write, rate = (_gif_writer(), _gif_rate(fps)) if is_gif else (_mp4_writer(), float(fps))
+    write, rate = (gif_writer(), gif_rate(fps)) if is_gif else (mp4_writer(), float(fps))
     progress_bar = require_tqdm().tqdm if progress else None
     renderer = Renderer(size)
     walk = walker.walk(
@@ -191,7 +191,7 @@ def _scene(walker: Walker, recording: _Recording, time: float, swing_share: floa
     pose = Pose(
         state=np.array([walk.headings[i], pitch, ankle, 0.0, 0.0]),
         stance=walk.stances[i],
-        inter_leg_angle=_swing_angle(recording.angles, i, share, swing_share),
+        inter_leg_angle=swing_angle(recording.angles, i, share, swing_share),
         mass_offset=float(offset),
         contact=walk.footprints[i],
     )
@@ -222,7 +222,7 @@ def _scene(walker: Walker, recording: _Recording, time: float, swing_share: floa
     )
 
 
-def _swing_angle(angles: Vector, i: int, share: float, swing_share: float) -> float:
+def swing_angle(angles: Vector, i: int, share: float, swing_share: float) -> float:
     """The inter-leg angle as drawn: from where the old stance leg was left to the front."""
     if i == 0 or share >= swing_share:
         return float(angles[i])
@@ -240,7 +240,7 @@ def _with_last_repeated(frames: Iterable[Frame], count: int) -> Iterator[Frame]:
         yield from last
 
 
-def _gif_rate(fps: float) -> float:
+def gif_rate(fps: float) -> float:
     """The nearest rate whose frames last whole hundredths of a second.
 
     At least two of them: viewers slow faster films down.
@@ -248,7 +248,8 @@ def _gif_rate(fps: float) -> float:
     return 100.0 / max(round(100.0 / fps), 2)
 
 
-def _mp4_writer() -> Writer:
+def mp4_writer() -> Writer:
+    """What writes frames as an .mp4; raises ``DependencyNotInstalled`` where ffmpeg is missing."""
     ffmpeg = require_ffmpeg()
 
     def write(path: Path, frames: Iterable[Frame], fps: float, size: tuple[int, int]) -> None:
@@ -272,7 +273,8 @@ def _mp4_writer() -> Writer:
     return write
 
 
-def _gif_writer() -> Writer:
+def gif_writer() -> Writer:
+    """What writes frames as a .gif; raises ``DependencyNotInstalled`` where pillow is missing."""
     image = require_pillow()
 
     def write(path: Path, frames: Iterable[Frame], fps: float, size: tuple[int, int]) -> None:

@@ -1,0 +1,306 @@
+"""A film of an agent at every task, with what is asked of it: ``python -m agents.evaluation.videos --help``."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import typer
+from tqdm import tqdm
+
+from agents.agent import Agent, State, attach
+from agents.evaluation.videos_push import draw_push
+from agents.registry import AGENTS, AgentRequest, env_id_of, make_agent, names_for
+from agents.seeds import evaluation_seed
+from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.envs.pictures import Footage
+from lean_yaw_env.envs.transition import ANKLE_PUSH, PITCH_PUSH
+from lean_yaw_env.envs.walker_env import WalkerEnv
+from lean_yaw_env.parameters import Foot, Vector, require_number
+from lean_yaw_env.registration import TASK_VERSIONS
+from lean_yaw_env.rendering.files import require_ending, written_whole
+from lean_yaw_env.rendering.filming import (
+    SECONDS_PER_TIME_UNIT,
+    Frame,
+    gif_rate,
+    gif_writer,
+    mp4_writer,
+    swing_angle,
+)
+from lean_yaw_env.rendering.geometry import Pose
+from lean_yaw_env.rendering.pygame_renderer import Renderer
+from lean_yaw_env.rendering.scene import Scene
+from lean_yaw_env.walker import Walker
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+
+SIZE = (640, 400)
+FPS = 12.5
+SECONDS = 12.0
+SPEED = 2.0
+"""Times as fast as a walker of a metre's leg on earth."""
+SWING_SHARE = 0.6
+HOLD_SECONDS = 1.0
+"""How long a film stays with a walker that has fallen."""
+STAND_INS = ("lqr", "feedback", "fixed")
+"""Who is filmed where there is no trained agent, the first that is for the task."""
+_SAMPLES = 17  # of the motion within a step
+
+
+@dataclass(frozen=True, eq=False)
+class FilmedStep:
+    """A walking step with the motion within it.
+
+    Attributes
+    ----------
+    scene : Scene
+        At its start.
+    end : when it ends, from the start of the film, in units of time
+    duration : float
+    pitch, ankle, offset : shape (samples,), at even times
+    centre : shape (samples, 2)
+        (downhill, right).
+    angles : inter-leg angles (before, now)
+    push : (pitch rate, ankle rate) that the step started with, or None without pushes
+    fall : the way it ended, or None
+    """
+
+    scene: Scene
+    end: float
+    duration: float
+    pitch: Vector
+    ankle: Vector
+    offset: Vector
+    centre: Vector
+    angles: tuple[float, float]
+    push: tuple[float, float] | None
+    fall: str | None
+
+
+def film_agent(
+    agent: Agent,
+    task: str,
+    path: str | Path,
+    *,
+    seed: int = 0,
+    options: EnvOptions | None = None,
+    seconds: float = SECONDS,
+    speed: float = SPEED,
+    fps: float = FPS,
+    size: tuple[int, int] = SIZE,
+    name: str = "",
+    progress: bool = False,
+) -> str | None:
+    """Film the first seconds of an episode that is kept for evaluation.
+
+    Parameters
+    ----------
+    agent : Agent
+    task : str
+    path : an .mp4 or a .gif; written whole or not at all
+    seed : int >= 0
+        Another one films another episode.
+    options : EnvOptions
+    seconds : (0, 600]
+    speed : (0, 100]
+        Times real time for legs of a metre.
+    fps : [1, 60]
+    size : pixels
+    name : of the agent, shown beside the picture
+    progress : bool
+
+    Returns
+    -------
+    The way the walker fell, or None.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of its range, or the path has another ending.
+    gymnasium.error.DependencyNotInstalled
+        If what draws or writes is not installed.
+    """
+    place = require_ending(path, (".gif", ".mp4"))
+    require_number("seconds", seconds, 0.0, 600.0, "(]")
+    require_number("speed", speed, 0.0, 100.0, "(]")
+    require_number("fps", fps, 1.0, 60.0)
+    is_gif = place.suffix.lower() == ".gif"
+    write, rate = (gif_writer(), gif_rate(fps)) if is_gif else (mp4_writer(), float(fps))
+    renderer = Renderer(size)
+    per_second = speed / SECONDS_PER_TIME_UNIT
+    steps = record_steps(
+        agent, task, seed=evaluation_seed(seed), options=options, time=seconds * per_second
+    )
+    ends = np.array([step.end for step in steps])
+    times = np.arange(0.0, min(ends[-1], seconds * per_second), per_second / rate)
+    scenes = (_scene_at(steps, ends, time, name) for time in times)
+    frames: Iterable[Frame] = (draw_push(renderer.frame(scene), push) for scene, push in scenes)
+    fall = steps[-1].fall if ends[-1] <= seconds * per_second else None
+    frames = _held(frames, round(HOLD_SECONDS * rate) if fall else 0)
+    if progress:
+        frames = tqdm(frames, total=len(times), desc=place.name, unit="frame", file=sys.stderr)
+    with written_whole(place) as temporary:
+        write(temporary, frames, rate, renderer.size)
+    return fall
+
+
+def record_steps(
+    agent: Agent,
+    task: str,
+    *,
+    seed: int,
+    time: float,
+    options: EnvOptions | None = None,
+) -> list[FilmedStep]:
+    """Walk an episode of an environment's seed for so many units of time, and keep the motion within its steps."""
+    env = WalkerEnv(task, **vars(EnvOptions() if options is None else options))
+    observation, info = env.reset(seed=seed)
+    attach(agent, env)
+    walker = Walker(env.rows.body_parameters(0))
+    footage = Footage(env.rows)
+    steps: list[FilmedStep] = []
+    state: State = None
+    ended, now = False, 0.0
+    while not ended and now < time:
+        scene, before = footage.scene(None), info
+        action, state = agent.predict(observation, state, np.array(not steps), True)
+        observation, _, terminated, truncated, info = env.step(action)
+        footage.extend()
+        ended = terminated or truncated
+        steps.append(_filmed(walker, scene, before, info, now))
+        now = steps[-1].end
+    env.close()
+    return steps
+
+
+def _filmed(
+    walker: Walker, scene: Scene, before: dict[str, Any], after: dict[str, Any], now: float
+) -> FilmedStep:
+    foot: Foot = "left" if before["stance_side"] > 0.0 else "right"
+    duration = max(float(after["duration"]), 1e-6)  # a fall at the start of a step lasts no time
+    motion = walker.stance_motion(
+        before["state"],
+        duration=duration,
+        samples=_SAMPLES,
+        stance=foot,
+        inter_leg_angle=after["inter_leg_angle"],
+        mass_offset=after["commanded_offset"],
+        previous_offset=before["mass_offset"],
+    )
+    heading = float(before["state"][0])
+    cosine, sine = math.cos(heading), math.sin(heading)
+    ahead, right = motion["centre_x"], motion["centre_z"]
+    turned = np.column_stack([cosine * ahead + sine * right, cosine * right - sine * ahead])
+    return FilmedStep(
+        scene=scene,
+        end=now + duration,
+        duration=duration,
+        pitch=motion["stance_pitch"],
+        ankle=motion["ankle_angle"],
+        offset=motion["mass_offset"],
+        centre=before["footprint"] + turned,
+        angles=(float(before["inter_leg_angle"]), float(after["inter_leg_angle"])),
+        push=(before["pitch_push"], before["ankle_push"]) if "pitch_push" in before else None,
+        fall=after["fall"],
+    )
+
+
+def _scene_at(
+    steps: list[FilmedStep], ends: Vector, time: float, name: str
+) -> tuple[Scene, tuple[float, float] | None]:
+    """The scene at an instant, and the push on its step in standard deviations of level 1."""
+    i = min(int(np.searchsorted(ends, time, side="right")), len(steps) - 1)
+    step = steps[i]
+    share = min(1.0 + (time - step.end) / step.duration, 1.0)
+    place = share * (_SAMPLES - 1)
+    grid = np.arange(_SAMPLES)
+    pitch, ankle, offset = (
+        float(np.interp(place, grid, values)) for values in (step.pitch, step.ankle, step.offset)
+    )
+    pose = Pose(
+        state=np.array([step.scene.pose.state[0], pitch, ankle, 0.0, 0.0]),
+        stance=step.scene.pose.stance,
+        inter_leg_angle=swing_angle(np.array(step.angles), 1, share, SWING_SHARE) if i else step.angles[1],
+        mass_offset=offset,
+        contact=step.scene.pose.contact,
+    )  # fmt: skip
+    walked = [earlier.centre for earlier in steps[:i]]
+    path = np.vstack([*walked, step.centre[: math.floor(place) + 1]])
+    lines = [name, *step.scene.lines] if name else list(step.scene.lines)
+    lines[-1] = f"falls: {step.fall}" if step.fall else lines[-1]
+    push = None if step.push is None else (step.push[0] / PITCH_PUSH, step.push[1] / ANKLE_PUSH)
+    return replace(step.scene, pose=pose, path=path, lines=lines), push
+
+
+def _held(frames: Iterable[Frame], count: int) -> Iterator[Frame]:
+    """The frames, the last one so many times more."""
+    last: Frame | None = None
+    for last in frames:
+        yield last
+    if last is not None:
+        yield from itertools.repeat(last, count)
+
+
+def agent_for(name: str, task: str, runs: Path, path: Path | None = None) -> tuple[str, Agent]:
+    """The agent of that name for a task; where it is a trained one that is not there, or not for the task, the best stand-in.
+
+    Raises
+    ------
+    ValueError
+        If there is no agent or task of that name, or none of them is for the task.
+    """
+    if name not in AGENTS:
+        raise ValueError(f"agent must be among {', '.join(AGENTS)}, not {name!r}")
+    request = AgentRequest(env_id_of(task), EnvOptions(), path=path, runs=runs)
+    found = names_for(request)
+    for candidate in (name, *STAND_INS):
+        if candidate in found:
+            return candidate, make_agent(candidate, request)
+    raise ValueError(f"agent must be one for {task}: {', '.join(found)}; not {name!r}")
+
+
+@app.command()
+def main(
+    task: Annotated[str, typer.Option(help="A task's name, or all.")] = "all",
+    agent: Annotated[
+        str, typer.Option(help="Who is filmed; where it is not trained for a task, lqr is.")
+    ] = "ppo",
+    out: Annotated[Path, typer.Option(help="Folder for <task>.gif.")] = Path("docs/videos"),
+    seed: Annotated[int, typer.Option(help="Another number films other episodes.")] = 0,
+    seconds: Annotated[float, typer.Option(help="Of each film.")] = SECONDS,
+    speed: Annotated[float, typer.Option(help="Times real time for legs of a metre.")] = SPEED,
+    fps: Annotated[float, typer.Option(help="Frames per second.")] = FPS,
+    size: Annotated[
+        tuple[int, int], typer.Option(help="Width and height, pixels; films of 640 400 are small.")
+    ] = SIZE,
+    ending: Annotated[
+        Literal["gif", "mp4"], typer.Option("--format", help="gif, which web pages show, or mp4.")
+    ] = "gif",
+    agent_path: Annotated[Path | None, typer.Option(help="Folder of the trained agent.")] = None,
+    runs: Annotated[Path, typer.Option(help="Where trainings left their folders.")] = Path("runs"),
+) -> None:
+    """Film an agent at every task, in an episode it was not trained on, with heading, goal, path and pushes drawn."""
+    try:
+        tasks = list(TASK_VERSIONS) if task == "all" else [task]
+        filmed = [(each, *agent_for(agent, each, runs, agent_path)) for each in tasks]
+        out.mkdir(parents=True, exist_ok=True)
+        for each, name, made in filmed:
+            path = out / f"{each.lower()}.{ending}"
+            fall = film_agent(
+                made, each, path, seed=seed, seconds=seconds, speed=speed, fps=fps, size=size,
+                name=f"{each}: {name}", progress=True,
+            )  # fmt: skip
+            how = f", falls {fall}" if fall else ""
+            typer.echo(f"{path}: {name}, {path.stat().st_size / 1e6:.2f} MB{how}")
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+if __name__ == "__main__":
+    app()
