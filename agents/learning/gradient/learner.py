@@ -65,10 +65,8 @@ class Learner:
         self.policy = make_policy(features, ACTION_SIZE, settings.hidden, self.generator)
         self.critic = Critic(features, settings.hidden, self.generator)
         self.target = copy.deepcopy(self.critic).requires_grad_(False)
-        self.policy_optimizer = Adam(self.policy.parameters(), settings.learning_rate, _BETAS)
-        self.critic_optimizer = Adam(
-            self.critic.parameters(), settings.critic_learning_rate, _BETAS
-        )
+        self.policy_optimizer = _adam(self.policy, settings.learning_rate)
+        self.critic_optimizer = _adam(self.critic, settings.critic_learning_rate)
 
     def update(self) -> list[Ended]:
         """Walk a window, improve policy and critic by it, and return the episodes that ended in it."""
@@ -170,6 +168,10 @@ class Learner:
         ):
             for group in optimizer.param_groups:
                 group["lr"] = share * first
+
+
+def _adam(network: nn.Module, learning_rate: float) -> Adam:
+    return Adam(network.parameters(), learning_rate, _BETAS, fused=True)
 
 
 def _under(name: str, arrays: Arrays) -> Arrays:

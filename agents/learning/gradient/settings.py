@@ -38,7 +38,7 @@ class GradientSettings:
         They show the policy states that it would not come to by itself. None leaves the environment as it is.
     """
 
-    steps: int = 400_000
+    steps: int = 160_000
     walkers: int = 64
     window: int = 32
     learning_rate: float = 3e-3
