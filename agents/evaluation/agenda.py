@@ -31,7 +31,7 @@ from lean_yaw_env.parameters import require_number
 from lean_yaw_env.rendering.files import written_whole
 
 _SHARE = 1024  # episodes walked side by side
-_COSTLY_SHARE = 25  # of an agent that plans: some tens of seconds
+_COSTLY_SHARE = 20  # of an agent that plans: some tens of seconds
 _WORTH_PROCESSES = 2048  # episodes; fewer are walked before another process has started
 _METRIC = "metric:"
 # Folders of the walker's package that no episode depends on

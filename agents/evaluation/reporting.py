@@ -26,7 +26,7 @@ from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.registration import TASK_VERSIONS
 
 ALL = "all"
-COSTLY_EPISODES = 100
+COSTLY_EPISODES = 40
 CACHE = "evaluations"
 """Folder, below that of the trainings, where finished episodes are kept."""
 
