@@ -65,7 +65,7 @@ def main(
         typer.Option(
             "--resume",
             help="Go on with what is unfinished of the task's newest run or series of seeds under --out, or of --run; "
-            "its options are kept.",
+            "its options are kept, and the result is bit for bit that of no interruption.",
         ),
     ] = False,
     folder: Annotated[
