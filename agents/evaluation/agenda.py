@@ -10,11 +10,12 @@ import os
 import signal
 import time
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -171,14 +172,14 @@ def _outcomes(
         for share in waiting:
             yield share, _walk(share, cache)
         return
-    with _pool(min(processes, len(waiting))) as submit:
-        futures = {submit(_walk, share, cache): share for share in waiting}
+    with _pool(min(processes, len(waiting))) as pool:
+        futures = {pool.submit(_walk, share, cache): share for share in waiting}
         for future in as_completed(futures):
             yield futures[future], future.result()
 
 
 @contextlib.contextmanager
-def _pool(processes: int) -> Iterator[Callable[..., Future[tuple[Episodes, float]]]]:
+def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     """Processes of one thread each; at an interruption what has begun ends and is kept, and nothing else begins."""
     with _environment(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1"):
         pool = ProcessPoolExecutor(
@@ -188,7 +189,7 @@ def _pool(processes: int) -> Iterator[Callable[..., Future[tuple[Episodes, float
             initargs=(signal.SIGINT, signal.SIG_IGN),
         )
         try:
-            yield pool.submit
+            yield pool
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
@@ -229,7 +230,7 @@ def _walk(share: _Share, cache: Path | None) -> tuple[Episodes, float]:
 
 
 def _write(path: Path, episodes: Episodes, seconds: float) -> None:
-    arrays = {_METRIC + name: values for name, values in episodes.metrics.items()}
+    arrays: dict[str, Any] = {_METRIC + name: each for name, each in episodes.metrics.items()}
     with written_whole(path) as temporary:
         np.savez(temporary, survived=episodes.survived, seconds=np.array(seconds), **arrays)
 

@@ -14,6 +14,7 @@ from agents.registry import agent_entry
 from lean_yaw_env.envs.tasks import task_named
 
 Verdict = Literal["better", "worse", "tie", "mixed"]
+_VERDICTS: dict[int, Verdict] = {1: "better", -1: "worse", 0: "tie"}
 
 
 @dataclass
@@ -83,9 +84,7 @@ def compare(first: Sample, second: Sample, metric: str) -> Comparison:
     by_mean, by_iqm = sign * _sign(mean), sign * _sign(iqm)
     if is_share(task, metric):
         iqm, by_iqm = Estimate(*[float("nan")] * 3), 0
-    verdict: Verdict = {1: "better", -1: "worse", 0: "tie"}[by_mean]
-    if by_mean * by_iqm < 0:
-        verdict = "mixed"
+    verdict = "mixed" if by_mean * by_iqm < 0 else _VERDICTS[by_mean]
     return Comparison(
         first.results.agent, second.results.agent, metric, mean, iqm, verdict, episodes
     )

@@ -13,13 +13,14 @@ from agents.evaluation.claims import direction
 from agents.evaluation.push_levels import LevelRow
 from agents.evaluation.results import Row, is_share
 from agents.evaluation.tables import estimate
-from agents.registry import Kind, agent_entry
+from agents.registry import KINDS, Kind, agent_entry
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.rendering.files import written_whole
 from lean_yaw_env.rendering.picture import new_figure
 
 _DPI = 150
 _COLUMNS = 4
+_INK = "0.2"
 _KIND_COLOURS: dict[Kind, str] = {
     "baseline": "0.45",
     "feedback": "tab:blue",
@@ -44,21 +45,22 @@ def save_leaderboard_plot(rows: Sequence[Row], path: Path) -> None:
         _draw_headline(axes, found, task, headline)
     for axes in places[len(tasks) :]:
         axes.set_axis_off()
-    kinds = dict.fromkeys(agent_entry(row.agent).kind for row in rows)
+    present: set[Kind] = {agent_entry(row.agent).kind for row in rows}
+    kinds: list[Kind] = [kind for kind in KINDS if kind in present]
     handles = [
         Line2D([], [], color=_KIND_COLOURS[kind], marker="o", linestyle="-", label=kind)
         for kind in kinds
     ]
-    handles.append(_key("o", "0.2", "interquartile mean or share, 95 % interval"))
-    handles.append(_key("o", "0.2", "mean", markerfacecolor="none"))
-    handles.append(_key("|", "0.2", "mean of one training"))
+    handles.append(_key("o", "interquartile mean or share, 95 % interval"))
+    handles.append(_key("o", "mean", "none"))
+    handles.append(_key("|", "lowest and highest mean of a training"))
     figure.legend(handles=handles, loc="outside lower center", ncols=2 * columns, fontsize="small", frameon=False)  # fmt: skip
     with written_whole(path) as temporary:
         figure.savefig(temporary, dpi=_DPI)
 
 
-def _key(marker: str, colour: str, label: str, **style: str) -> Line2D:
-    return Line2D([], [], color=colour, marker=marker, linestyle="", label=label, **style)
+def _key(marker: str, label: str, fill: str = _INK) -> Line2D:
+    return Line2D([], [], color=_INK, markerfacecolor=fill, marker=marker, linestyle="", label=label)  # fmt: skip
 
 
 def _draw_headline(axes: Axes, rows: Sequence[Row], task: str, headline: str) -> None:
