@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_are
 from typer.testing import CliRunner
 
-from agents import FixedController, HeadingFeedback, RandomController
+from agents import FixedController, HeadingFeedback, HeadingGains, RandomController
 from agents.evaluation.closed_loop import app, examine, write_report
 from agents.evaluation.closed_loop_gait import (
     ZERO,
@@ -42,7 +42,11 @@ from lean_yaw_env.kernel.records import Command
 from lean_yaw_env.parameters import MIRROR, STATE_FIELDS
 
 FIXED = ClosedLoop(FixedController(), "Heading")
-FEEDBACK = ClosedLoop(HeadingFeedback(), "Heading")
+# gains of its own: those tuned may change, and may bring a gait next to a limit of its actions
+GAINS = HeadingGains(
+    proportional=0.05, ankle=-0.056, ankle_rate=0.01, feedforward=0.95, inter_leg_angle=0.1
+)
+FEEDBACK = ClosedLoop(HeadingFeedback(gains=GAINS), "Heading")
 
 
 class Linear:
@@ -142,14 +146,14 @@ def test_the_map_is_the_environments_own_step_bit_for_bit(loop):
 
 @pytest.mark.parametrize("task", ["Heading", "SpeedHeading"])
 def test_the_jacobian_is_the_limit_of_small_differences_of_the_environments_stride(task):
-    loop = ClosedLoop(HeadingFeedback(task), task)
+    loop = ClosedLoop(HeadingFeedback(task, gains=GAINS), task)
     gait = find_closed_loop_gait(loop)
     matrix, error = stride_jacobian(loop, gait.state)
     for column in range(len(gait.state)):
         small = 2e-4 * np.eye(len(gait.state))[column]
         ahead, back = (stride(loop, gait.state + way * small)[0][-1] for way in (1.0, -1.0))
-        # the third derivative times 4e-8, and actions rounded to 1e-8 over 4e-4
-        assert np.allclose(matrix[:, column], (ahead - back) / 4e-4, atol=2e-3, rtol=1e-3)
+        # commands are rounded to some 1e-8, over 4e-4; the third derivative times 4e-8 is less
+        assert np.allclose(matrix[:, column], (ahead - back) / 4e-4, atol=2e-4, rtol=2e-4)
     assert error.max() < 1e-3
 
 

@@ -235,7 +235,7 @@ def _repeated(loop: ClosedLoop, size: int) -> list[int]:
 def _described(loop: ClosedLoop, state: Vector) -> ClosedLoopGait:
     states, outcomes, commands = stride(loop, state)
     matrix, error = stride_jacobian(loop, state)
-    eigenvalues = np.linalg.eigvals(matrix)
+    eigenvalues = np.asarray(np.linalg.eigvals(matrix), dtype=complex)
     chord = float(np.hypot(sum(o.displacement_x for o in outcomes), sum(o.displacement_z for o in outcomes)))  # fmt: skip
     duration = sum(outcome.duration for outcome in outcomes)
     cycle = LimitCycle(
@@ -271,7 +271,7 @@ def _modes(cycle: LimitCycle, error: Vector) -> tuple[ClosedMode, ...]:
     found = []
     for mode in modes(cycle):
         left, right = np.abs(mode.left_vector), np.abs(mode.vector)
-        overlap = abs(mode.left_vector @ mode.vector)
+        overlap = float(abs(mode.left_vector @ mode.vector))
         bound = float(left @ error @ right)
         taking_part = left * right if (left * right).sum() > _ARRIVED else right**2
         shares = {

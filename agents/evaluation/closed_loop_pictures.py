@@ -113,7 +113,7 @@ def save_basins(reports: Sequence[ClosedLoopReport], path: Path) -> None:
             if column == 0:
                 place.set_ylabel(_WORDS[basin.y])
     figure.suptitle(f"{reports[0].task}: how a walk from each start ends, share survived")
-    handles = [
+    handles: list[Any] = [
         Patch(facecolor=_ENDING_COLOURS[k], edgecolor="black", linewidth=0.5, label=_ending(key))
         for k, key in enumerate(keys)
         if key in seen
@@ -128,7 +128,8 @@ def save_pushes(reports: Sequence[ClosedLoopReport], path: Path) -> None:
     """Draw the largest push survived in every direction of the two rates; once more near the middle, where the weak directions are."""
     pushed = [report for report in reports if report.pushes is not None]
     figure = new_figure(12.4, 5.6)
-    worst = max((float(r.pushes.sizes.min()) for r in pushed if r.pushes), default=1.0)
+    least = [float(report.pushes.sizes.min()) for report in pushed if report.pushes]
+    worst = float(np.median(least)) if least else 1.0
     for k, (reach, title) in enumerate(((None, "all of it"), (2.2 * worst, "near the middle"))):
         axes: Any = figure.add_subplot(1, 2, k + 1, projection="polar")
         for colour, report in zip(_colours(reports), reports, strict=True):

@@ -18,9 +18,9 @@ from agents.agent import Agent, State, attach
 from agents.evaluation.videos_push import draw_push
 from agents.registry import AGENTS, AgentRequest, env_id_of, make_agent, names_for
 from agents.seeds import evaluation_seed
+from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.pictures import Footage
-from lean_yaw_env.envs.transition import ANKLE_PUSH, PITCH_PUSH
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.parameters import Foot, Vector, require_number
 from lean_yaw_env.registration import TASK_VERSIONS
@@ -40,9 +40,9 @@ from lean_yaw_env.walker import Walker
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
-SIZE = (640, 400)
-FPS = 12.5
-SECONDS = 12.0
+SIZE = (600, 380)
+FPS = 10.0
+SECONDS = 11.0
 SPEED = 2.0
 """Times as fast as a walker of a metre's leg on earth."""
 SWING_SHARE = 0.6
@@ -67,7 +67,7 @@ class FilmedStep:
     centre : shape (samples, 2)
         (downhill, right).
     angles : inter-leg angles (before, now)
-    push : (pitch rate, ankle rate) that the step started with, or None without pushes
+    push : (pitch rate, ankle rate) that the step started with, in standard deviations of the task's, or None without pushes
     fall : the way it ended, or None
     """
 
@@ -173,14 +173,19 @@ def record_steps(
         observation, _, terminated, truncated, info = env.step(action)
         footage.extend()
         ended = terminated or truncated
-        steps.append(_filmed(walker, scene, before, info, now))
+        steps.append(_filmed(walker, scene, before, info, now, env.rows.settings))
         now = steps[-1].end
     env.close()
     return steps
 
 
 def _filmed(
-    walker: Walker, scene: Scene, before: dict[str, Any], after: dict[str, Any], now: float
+    walker: Walker,
+    scene: Scene,
+    before: dict[str, Any],
+    after: dict[str, Any],
+    now: float,
+    settings: Vector,
 ) -> FilmedStep:
     foot: Foot = "left" if before["stance_side"] > 0.0 else "right"
     duration = max(float(after["duration"]), 1e-6)  # a fall at the start of a step lasts no time
@@ -206,15 +211,24 @@ def _filmed(
         offset=motion["mass_offset"],
         centre=before["footprint"] + turned,
         angles=(float(before["inter_leg_angle"]), float(after["inter_leg_angle"])),
-        push=(before["pitch_push"], before["ankle_push"]) if "pitch_push" in before else None,
+        push=_push(before, settings),
         fall=after["fall"],
+    )
+
+
+def _push(info: dict[str, Any], settings: Vector) -> tuple[float, float] | None:
+    if "pitch_push" not in info:
+        return None
+    return (
+        info["pitch_push"] / settings[c.PITCH_PUSH_SIZE],
+        info["ankle_push"] / settings[c.ANKLE_PUSH_SIZE],
     )
 
 
 def _scene_at(
     steps: list[FilmedStep], ends: Vector, time: float, name: str
 ) -> tuple[Scene, tuple[float, float] | None]:
-    """The scene at an instant, and the push on its step in standard deviations of level 1."""
+    """The scene at an instant, and the push on its step."""
     i = min(int(np.searchsorted(ends, time, side="right")), len(steps) - 1)
     step = steps[i]
     share = min(1.0 + (time - step.end) / step.duration, 1.0)
@@ -232,10 +246,9 @@ def _scene_at(
     )  # fmt: skip
     walked = [earlier.centre for earlier in steps[:i]]
     path = np.vstack([*walked, step.centre[: math.floor(place) + 1]])
-    lines = [name, *step.scene.lines] if name else list(step.scene.lines)
-    lines[-1] = f"falls: {step.fall}" if step.fall else lines[-1]
-    push = None if step.push is None else (step.push[0] / PITCH_PUSH, step.push[1] / ANKLE_PUSH)
-    return replace(step.scene, pose=pose, path=path, lines=lines), push
+    now = f"falls: {step.fall}" if step.fall else f"time {time:.0f}"
+    lines = (name, now) if name else (now,)  # more of them would hide the walker of a small picture
+    return replace(step.scene, pose=pose, path=path, lines=lines), step.push
 
 
 def _held(frames: Iterable[Frame], count: int) -> Iterator[Frame]:
@@ -277,7 +290,7 @@ def main(
     speed: Annotated[float, typer.Option(help="Times real time for legs of a metre.")] = SPEED,
     fps: Annotated[float, typer.Option(help="Frames per second.")] = FPS,
     size: Annotated[
-        tuple[int, int], typer.Option(help="Width and height, pixels; films of 640 400 are small.")
+        tuple[int, int], typer.Option(help="Width and height, pixels; films of 600 380 are small.")
     ] = SIZE,
     ending: Annotated[
         Literal["gif", "mp4"], typer.Option("--format", help="gif, which web pages show, or mp4.")

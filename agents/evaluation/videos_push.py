@@ -10,14 +10,14 @@ from lean_yaw_env.rendering.filming import Frame
 from lean_yaw_env.rendering.optional import require_pillow
 from lean_yaw_env.rendering.palette import ANKLE_AXIS, FAINT_INK, FLOOR, INK
 
-RADIUS = 30.0
-"""Of the dial, pixels: a push of ``REACH`` standard deviations of level 1."""
+RADIUS = 22.0
+"""Of the dial, pixels: a push of ``REACH`` standard deviations."""
 REACH = 2.0
-_PLACE = (0.5, 52.0)  # share of the width, pixels from the top
+_PLACE = (0.5, 28.0)  # share of the width, pixels from the top
 
 
 def draw_push(frame: Frame, push: tuple[float, float] | None) -> Frame:
-    """A frame with the push (pitch rate, ankle rate), in standard deviations of level 1, as an arrow.
+    """A frame with the push (pitch rate, ankle rate), in standard deviations, as an arrow.
 
     A negative pitch rate is forward and up on the dial; a positive ankle rate is to the right.
     """
@@ -37,7 +37,7 @@ def draw_push(frame: Frame, push: tuple[float, float] | None) -> Frame:
     tip = (x + size * math.cos(angle), y - size * math.sin(angle))
     draw.line((x, y, *tip), fill=ANKLE_AXIS, width=3)
     barbs = [
-        (tip[0] - 7.0 * math.cos(angle + turn), tip[1] + 7.0 * math.sin(angle + turn))
+        (tip[0] - 8.0 * math.cos(angle + turn), tip[1] + 8.0 * math.sin(angle + turn))
         for turn in (-0.5, 0.5)
     ]
     if size > 1.0:
