@@ -1,0 +1,210 @@
+"""How soon the gradient agent and PPO come to the same score: steps, and processor seconds of one core.
+
+``python -m benchmarks.gradient --task Heading`` trains both with their own settings for the task, several seeds each, and now and then
+judges the policies without exploration on held-out episodes, off the clock. Each finished training is kept in ``benchmarks/results``, and
+not done again by the next call; the picture is drawn from all that are there.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from tqdm import tqdm
+
+from agents.evaluation.scoring import run_episodes
+from agents.files import read_json, write_json
+from agents.learning.algorithms import algorithm_named
+from agents.learning.checkpoint import Arrays, read_checkpoint
+from agents.observations import ObservationLayout
+from agents.policies.policy import Policy, PolicyCard
+from agents.policies.storage import save, task_of
+from agents.registry import env_id_of
+from benchmarks.learning_plot import save_comparison
+from benchmarks.machine import machine
+from lean_yaw_env.envs.options import EnvOptions
+
+RESULTS = Path(__file__).parent / "results"
+ALGORITHMS = ("apg", "ppo")
+EPISODES = 100  # of a look at a policy while it is trained
+LOOKS = 12  # at most, in a training
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A training as it was looked at: after so many steps and seconds, the mean return of held-out episodes."""
+
+    algorithm: str
+    seed: int
+    settings: dict[str, Any]
+    steps: list[int] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    returns: list[float] = field(default_factory=list)
+
+    def reaches(self, level: float) -> tuple[float, float]:
+        """Steps and seconds at the first look at which the return was at least ``level``; infinite if at none."""
+        for steps, seconds, value in zip(self.steps, self.seconds, self.returns, strict=True):
+            if value >= level:
+                return float(steps), seconds
+        return float("inf"), float("inf")
+
+
+class Watch:
+    """Looks at a training through its checkpoints, between updates, and keeps the clock without that."""
+
+    def __init__(self, env_id: str, algorithm: str, curve: Curve, file: Path, every: int) -> None:
+        self._env_id = env_id
+        self._algorithm = algorithm
+        self._curve = curve
+        self._file = file
+        self._every = every
+        self._paused = 0.0
+        self._clock: dict[int, float] = {0: 0.0}
+        self._began = time.process_time()
+
+    def __call__(self, steps: int, recent_return: float) -> None:
+        """Told of the steps done and the return while exploring, which is not what is compared; the checkpoint may be of now or of the time before."""
+        now = time.process_time()
+        self._clock[steps] = now - self._began - self._paused
+        if self._file.exists():
+            arrays = read_checkpoint(self._file)
+            done = int(arrays["count.steps"])
+            last = self._curve.steps[-1] if self._curve.steps else 0
+            if done in self._clock and done >= last + self._every:
+                self.note(done, self._clock[done], policy_in(self._env_id, self._algorithm, arrays))
+        self._paused += time.process_time() - now
+
+    def finish(self, steps: int, policy: Policy) -> None:
+        """Look at the policy that came of it."""
+        self.note(steps, time.process_time() - self._began - self._paused, policy)
+
+    def note(self, steps: int, seconds: float, policy: Policy) -> None:
+        """Judge a policy, and write down what it comes to."""
+        episodes = run_episodes(policy, task_of(self._env_id), episodes=EPISODES)
+        self._curve.steps.append(steps)
+        self._curve.seconds.append(round(seconds, 2))
+        self._curve.returns.append(round(float(episodes.metrics["return"].mean()), 3))
+
+
+def policy_in(env_id: str, algorithm: str, arrays: Arrays) -> Policy:
+    """The policy within a training's checkpoint."""
+    layout = ObservationLayout.of(task_of(env_id), EnvOptions())
+    if algorithm == "ppo":
+        names = ["policy.mlp_extractor.policy_net.0", "policy.mlp_extractor.policy_net.2", "policy.action_net"]  # fmt: skip
+        mean, variance = arrays["observations.mean"], arrays["observations.var"]
+    else:
+        names = ["policy.0", "policy.2", "policy.4"]
+        mean, variance = np.zeros(len(layout.names)), np.ones(len(layout.names))
+    weights = {
+        f"layers.{k}.{part}": arrays[f"{name}.{part}"]
+        for k, name in enumerate(names)
+        for part in ("weight", "bias")
+    }
+    weights["observation_mean"] = mean.astype(np.float32)
+    weights["observation_variance"] = variance.astype(np.float32)
+    weights["log_std"] = np.zeros(2, dtype=np.float32)
+    return Policy(PolicyCard(env_id, EnvOptions(), layout, algorithm), weights)
+
+
+def learn(
+    env_id: str, algorithm: str, seed: int, steps: int | None, progress: bool = True
+) -> tuple[Curve, Policy]:
+    """Train once, looking at the policy now and then."""
+    found = algorithm_named(algorithm)
+    settings = found.settings_for(env_id)
+    if steps is not None:
+        settings = replace(settings, steps=steps)
+    curve = Curve(algorithm, seed, json.loads(json.dumps(asdict(settings))))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "checkpoint.safetensors"
+        watch = Watch(env_id, algorithm, curve, file, settings.steps // LOOKS)
+        trained = found.train(
+            env_id, settings, seed=seed, checkpoint=file, checkpoint_seconds=0.0, report=watch,
+            progress=progress,
+        )  # fmt: skip
+    watch.finish(int(trained.policy.card.training["steps"]), trained.policy)
+    return curve, trained.policy
+
+
+def compare(
+    env_id: str,
+    counts: dict[str, int],
+    file: Path,
+    steps: dict[str, int | None],
+    kept: Callable[[str, int, Policy], object],
+) -> list[Curve]:
+    """Every algorithm's trainings, those already in ``file`` not done again; the policies of new ones are handed to ``kept``."""
+    curves = [Curve(**values) for values in read_json(file)["curves"]] if file.exists() else []
+    done = {(curve.algorithm, curve.seed) for curve in curves}
+    wanted = [(a, seed) for a, count in counts.items() for seed in range(count)]
+    for algorithm, seed in tqdm([pair for pair in wanted if pair not in done], desc="trainings"):
+        curve, policy = learn(env_id, algorithm, seed, steps[algorithm])
+        kept(algorithm, seed, policy)
+        curves.append(curve)
+        write_json(
+            file, {"env_id": env_id, "episodes": EPISODES, "curves": [asdict(c) for c in curves]} | machine(),
+        )  # fmt: skip
+    return curves
+
+
+def table(curves: list[Curve], levels: list[float]) -> str:
+    """Medians over seeds of steps and seconds to each level."""
+    lines = [f"{'return':>8} {'algorithm':>10} {'seeds':>6} {'steps':>12} {'seconds':>9}"]
+    for level in levels:
+        for algorithm in ALGORITHMS:
+            reached = [c.reaches(level) for c in curves if c.algorithm == algorithm]
+            if reached:
+                steps, seconds = np.median(np.array(reached), axis=0)
+                lines.append(
+                    f"{level:8g} {algorithm:>10} {len(reached):6d} {steps:12,.0f} {seconds:9.1f}"
+                )
+    return "\n".join(lines)
+
+
+def main(
+    task: Annotated[str, typer.Option(help="The task's name.")] = "Heading",
+    apg: Annotated[int, typer.Option(help="Trainings of the gradient agent.")] = 5,
+    ppo: Annotated[int, typer.Option(help="Trainings of PPO.")] = 5,
+    apg_steps: Annotated[
+        int | None, typer.Option(help="Steps of each, in place of the task's.")
+    ] = None,
+    ppo_steps: Annotated[
+        int | None, typer.Option(help="Steps of each, in place of the task's.")
+    ] = None,
+    level: Annotated[
+        list[float] | None, typer.Option(help="Returns whose reaching is compared.")
+    ] = None,
+    keep: Annotated[
+        Path | None, typer.Option(help="Folder for the trained policies; none otherwise.")
+    ] = None,
+) -> None:
+    """Train both algorithms on a task and compare how soon they come to the same score."""
+    env_id = env_id_of(task)
+
+    def kept(algorithm: str, seed: int, policy: Policy) -> None:
+        if keep is not None:
+            save(policy, keep / f"{task}-{algorithm}-seed{seed}")
+
+    file = RESULTS / f"gradient_{task}.json"
+    RESULTS.mkdir(exist_ok=True)
+    curves = compare(
+        env_id, {"apg": apg, "ppo": ppo}, file, {"apg": apg_steps, "ppo": ppo_steps}, kept
+    )
+    best = min(
+        float(np.median([c.returns[-1] for c in curves if c.algorithm == a]))
+        for a in {c.algorithm for c in curves}
+    )
+    levels = level or [round(share * best, 1) for share in (0.8, 0.9, 0.95, 0.99)]
+    typer.echo(table(curves, levels))
+    save_comparison(curves, task, machine(), file.with_suffix(".png"))
+
+
+if __name__ == "__main__":
+    typer.run(main)
