@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from agents.evaluation.closed_loop_map import GOAL_AHEAD
 from agents.evaluation.closed_loop_report import (
     ClosedLoopReport,
     eigenvalue_table,
@@ -48,7 +49,6 @@ def markdown_page(
     command: str,
     picture_name: Callable[[str, str], str],
     notes: Mapping[str, str],
-    goal: float = 12.0,
 ) -> str:
     """The page.
 
@@ -63,7 +63,7 @@ def markdown_page(
         f"{reach:g} {_UNITS[name]} of its {name.replace('_', ' ')}"
         for name, reach in REACHES.items()
     )
-    parts = [_HEAD.format(command=command, reaches=reaches, goal=f"{goal:g}")]
+    parts = [_HEAD.format(command=command, reaches=reaches, goal=f"{GOAL_AHEAD:g}")]
     for task, reports in by_task.items():
         parts.append(f"## {task}\n")
         parts.append(f"{markdown_table(reports)}\n\n{eigenvalue_table(reports)}\n")
