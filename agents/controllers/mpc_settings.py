@@ -99,6 +99,12 @@ class MpcSettings:
         require_number("push_scale", self.push_scale, 0.0, 10.0)
 
 
+# Uphill, or on the level, a fall is decided long before it comes: plans are followed until the regulator has the walker in its gait again
+_PUMPING = MpcSettings(
+    horizon=6, tail=16, knots=(0, 2, 4), samples=24, iterations=2, elites=5,
+    spread=Spread(0.15, 0.2, 0.2), window=25.0, trust=1.0,
+)  # fmt: skip
+
 SETTINGS: dict[str, MpcSettings] = {
     "Heading": MpcSettings(step_price=0.05),
     "SpeedHeading": MpcSettings(step_price=0.05, window=12.0),
@@ -109,12 +115,7 @@ SETTINGS: dict[str, MpcSettings] = {
         horizon=1, tail=6, knots=(0,), samples=12, iterations=1, elites=4,
         spread=Spread(0.3, 0.0, 0.3), trust=1.0, scenarios=16, push_scale=1.5,
     ),
-    "UTurn": MpcSettings(
-        horizon=12, tail=4, samples=40, iterations=2, spread=Spread(0.2, 0.3, 0.3), step_price=0.1
-    ),
-    "Level": MpcSettings(
-        horizon=6, tail=8, knots=(0, 2, 4), samples=40, iterations=2,
-        spread=Spread(0.15, 0.2, 0.2), window=40.0, trust=2.0,
-    ),
+    "UTurn": _PUMPING,
+    "Level": _PUMPING,
 }  # fmt: skip
 """By task: chosen by hand among a few, by the return over 8 to 24 episodes kept for tuning; ``tune_mpc`` seeks further."""
