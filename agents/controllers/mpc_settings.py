@@ -118,4 +118,4 @@ SETTINGS: dict[str, MpcSettings] = {
     "UTurn": _PUMPING,
     "Level": _PUMPING,
 }  # fmt: skip
-"""By task: chosen by hand among a few, by the return over 8 to 24 episodes kept for tuning; ``tune_mpc`` seeks further."""
+"""By task: chosen by hand among a few, by the return over 6 to 24 episodes kept for tuning (Level as UTurn); ``tune_mpc`` seeks further."""
