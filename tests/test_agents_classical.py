@@ -38,7 +38,7 @@ from lean_yaw_env.parameters import MIRROR
 WEIGHTS = LqrWeights()
 RAW = EnvOptions(mirror=False)
 MIDDLE = int(np.argmin(np.abs(np.array(ANGLES) - 0.3)))
-TASKS = ("Heading", "SpeedHeading", "Push", "Slalom", "Waypoint", "Level")
+TASKS = ("Heading", "SpeedHeading", "Push", "Slalom", "Waypoint", "Level", "UTurn")
 AGENTS_BY_TASK = {task: guided(task, EnvOptions()) for task in TASKS}
 
 
@@ -199,22 +199,23 @@ def test_the_gait_itself_is_answered_by_its_own_command():
 @pytest.mark.parametrize(
     ("task", "metric", "least"),
     [
-        # means over 1,000 held-out episodes in brackets; 32 episodes stray from them by a tenth or so
-        ("Heading", "settled_fraction", 0.8),  # HEADING
-        ("SpeedHeading", "settled_fraction", 0.7),  # SPEED
-        ("Push", "survived_200_steps", 0.5),  # PUSH
-        ("Waypoint", "goals", 4.0),  # WAYPOINT
-        ("Level", "settled_fraction", 0.75),  # LEVEL
+        # means over 1,000 held-out episodes in brackets; 24 episodes stray from them by a tenth or so
+        ("Heading", "settled_fraction", 0.8),  # (0.87)
+        ("SpeedHeading", "settled_fraction", 0.6),  # (0.71)
+        ("Push", "survived_200_steps", 0.7),  # (0.91)
+        ("Waypoint", "goals", 5.0),  # (6.1)
+        ("Level", "settled_fraction", 0.7),  # (0.81)
+        ("UTurn", "settled_fraction", 0.5),  # (0.6)
     ],
 )
 def test_a_task_is_done_as_well_as_measured(task, metric, least):
-    results = run_episodes(AGENTS_BY_TASK[task], task, episodes=32)
+    results = run_episodes(AGENTS_BY_TASK[task], task, episodes=24)
     assert results.metrics[metric].mean() > least
 
 
 def test_a_commanded_speed_is_walked_where_the_paper_has_one_speed():
-    regulated = run_episodes(AGENTS_BY_TASK["SpeedHeading"], "SpeedHeading", episodes=32)
-    fixed = run_episodes(FixedController(), "SpeedHeading", episodes=32)
+    regulated = run_episodes(AGENTS_BY_TASK["SpeedHeading"], "SpeedHeading", episodes=24)
+    fixed = run_episodes(FixedController(), "SpeedHeading", episodes=24)
     error = "mean_absolute_speed_error"
     assert regulated.metrics[error].mean() < 0.8 * fixed.metrics[error].mean()
 
