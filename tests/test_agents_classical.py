@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.interpolate import RegularGridInterpolator
 from scipy.linalg import solve_discrete_lyapunov
 
 from agents import AgentRequest, FixedController, make_agent
@@ -142,6 +143,24 @@ def test_the_last_turn_follows_from_the_state_that_it_left(walker, gait):
         # the turn is read off the left-hand frame; what is left is of second order in 0.01
         assert -weights @ left == pytest.approx(turned, abs=2e-3)
         assert abs(turned) < 0.2
+
+
+def test_schedules_are_linear_between_nodes_as_scipy_has_it_and_held_at_the_edges(schedule):
+    grid = (schedule.angles, schedule.headings)
+    scipys = RegularGridInterpolator(grid, schedule._table)
+    generator = np.random.default_rng(0)
+    # beyond the edges too, and on nodes
+    angles = np.concatenate([generator.uniform(0.0, 0.6, 200), schedule.angles])
+    headings = np.concatenate([generator.uniform(-1.0, 1.0, 200), np.resize(schedule.headings, 13)])
+    held = [np.clip(x, nodes[0], nodes[-1]) for x, nodes in zip((angles, headings), grid, strict=True)]  # fmt: skip
+    expected = scipys(np.stack(held, axis=-1))
+    found = schedule.at(angles, headings)
+    flat = [found.state, found.inter_leg_angle[:, None], found.gain.reshape(-1, 12), found.turn]
+    columns = [*range(6), *range(9, expected.shape[1])]
+    # rounding alone: the products are summed in another order
+    np.testing.assert_allclose(np.hstack(flat), expected[:, columns], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(found.held_offset, expected[:, 6], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(found.pumping, expected[:, 7], rtol=1e-12, atol=1e-12)
 
 
 def test_scheduled_speeds_are_those_of_the_angles_they_give(schedule):

@@ -164,7 +164,8 @@ class LqrLoop:
 def _deviation(gait: Scheduled, state: Vector, offset: Vector) -> Vector:
     """(..., 5): state without heading, and offset, less the gait's; the masses are where the right foot's step left them."""
     before = gait.held_offset - gait.pumping
-    return np.concatenate([state - gait.state, (offset - before)[..., None]], axis=-1)[..., 1:]
+    rest = state[..., 1:] - gait.state[..., 1:]
+    return np.concatenate([rest, (offset - before)[..., None]], axis=-1)
 
 
 class HeadingLqr:

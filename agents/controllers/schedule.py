@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RegularGridInterpolator
 
 from agents.controllers.gaits import (
     ANGLES,
@@ -19,9 +18,28 @@ from agents.controllers.gaits import (
     headings_of,
 )
 from agents.controllers.regulator import SIZE, LqrWeights, last_turn, periodic_gains
+from lean_yaw_env.kernel.compilation import entry_point
 from lean_yaw_env.parameters import STATE_SIZE, Vector, WalkerParameters
 
-_COLUMNS = np.cumsum((STATE_SIZE, 1, 1, 1, 1, 2 * SIZE, STATE_SIZE))[:-1]
+_SCALARS = STATE_SIZE  # first column after the state
+_GAIN = _SCALARS + 4
+_TURN = _GAIN + 2 * SIZE
+
+
+@entry_point()
+def _interpolate(table, angles, headings, at_angles, at_headings, found):
+    """Bilinear interpolation of ``table`` (angles, headings, k) at n points of the grid, into ``found`` (n, k)."""
+    # compiled: scipy's interpolator for a regular grid takes longer than a walking step, and planners ask at every one
+    for row in range(len(found)):
+        angle, heading = at_angles[row], at_headings[row]
+        i = min(max(np.searchsorted(angles, angle) - 1, 0), len(angles) - 2)
+        j = min(max(np.searchsorted(headings, heading) - 1, 0), len(headings) - 2)
+        up = (angle - angles[i]) / (angles[i + 1] - angles[i])
+        right = (heading - headings[j]) / (headings[j + 1] - headings[j])
+        for k in range(found.shape[1]):
+            near = (1.0 - right) * table[i, j, k] + right * table[i, j + 1, k]
+            far = (1.0 - right) * table[i + 1, j, k] + right * table[i + 1, j + 1, k]
+            found[row, k] = (1.0 - up) * near + up * far
 
 
 class Scheduled(NamedTuple):
@@ -83,24 +101,22 @@ class GainSchedule:
         # without a downhill one column stands for all, at either end of any range
         self.headings = np.array(headings_of(parameters, drive)) if self.has_downhill else np.array([-1.0, 1.0])  # fmt: skip
         nodes = gait_nodes(parameters, drive)
-        values = np.array([_row_values(row, weights) for row in nodes])
-        self._table = RegularGridInterpolator((self.angles, self.headings), values)
+        self._table = np.array([_row_values(row, weights) for row in nodes])
         self.speeds = np.array([[node.speed for node in row] for row in nodes])
 
     def at(self, angles: Vector, headings: Vector) -> Scheduled:
         """Gaits and gains at points of any shape, held at the grid's edges."""
-        points = np.stack(
-            [
-                np.clip(angles, self.angles[0], self.angles[-1]),
-                np.clip(headings, self.headings[0], self.headings[-1]),
-            ],
-            axis=-1,
+        angles, headings = np.broadcast_arrays(
+            np.clip(angles, self.angles[0], self.angles[-1]),
+            np.clip(headings, self.headings[0], self.headings[-1]),
         )
-        # the interpolator makes a row of a single point
-        found = self._table(points).reshape(*points.shape[:-1], -1)
-        state, angle, held, pumping, _, gain, turn = np.split(found, _COLUMNS, axis=-1)
-        gain = gain.reshape(*gain.shape[:-1], 2, SIZE)
-        return Scheduled(state, angle[..., 0], held[..., 0], pumping[..., 0], gain, turn)
+        found = np.empty((angles.size, self._table.shape[-1]))
+        grid = (self._table, self.angles, self.headings)
+        _interpolate(*grid, angles.ravel(), headings.ravel(), found)
+        found = found.reshape(*angles.shape, -1)
+        gain = found[..., _GAIN:_TURN].reshape(*angles.shape, 2, SIZE)
+        angle, held, pumping, _ = np.moveaxis(found[..., _SCALARS:_GAIN], -1, 0)
+        return Scheduled(found[..., :STATE_SIZE], angle, held, pumping, gain, found[..., _TURN:])
 
     def angles_of(self, speeds: Vector, headings: Vector) -> Vector:
         """The inter-leg angles whose gaits walk at these speeds along these headings, or the nearest of the grid."""
