@@ -72,7 +72,10 @@ class SACSettings:
             )
 
 
-SETTINGS: dict[str, SACSettings] = {}
+SETTINGS: dict[str, SACSettings] = {
+    # falls under harder pushes are what it learns from, as PPO's settings say
+    "LeanYaw/Push-v0": SACSettings(steps=120_000, push_level=0.8),
+}
 """Settings that were tuned for an environment."""
 
 
