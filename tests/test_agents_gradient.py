@@ -86,9 +86,9 @@ def test_derivatives_of_all_that_rewards_are_made_of_agree_with_differences(shif
         assert error.max() < 1e-5
 
 
-def walked_total(task, actions, options=None):
+def walked_total(task, actions, options):
     """The sum of all rewards, and of the squares of the last observations, of open-loop walks; and how many fell."""
-    walkers = DifferentiableWalkers(task, options or EnvOptions(), actions.shape[1])
+    walkers = DifferentiableWalkers(task, options, actions.shape[1])
     walkers.reset(5)
     rewards, fell = torch.zeros(()), 0
     for action in actions:
@@ -99,20 +99,24 @@ def walked_total(task, actions, options=None):
     return rewards, (observations**2).sum(), fell
 
 
-@pytest.mark.parametrize("task", FORMULAS)
-def test_gradient_through_a_window_of_a_task_agrees_with_central_differences(task):
+OPTIONS = [("Heading", EnvOptions(random_body="training")), ("SpeedHeading", EnvOptions(sensor_noise=0.1, hidden_rates=True))]  # fmt: skip
+
+
+@pytest.mark.parametrize(("task", "options"), [*((task, EnvOptions()) for task in FORMULAS), *OPTIONS])  # fmt: skip
+def test_gradient_through_a_window_of_a_task_agrees_with_central_differences(task, options):
     generator = torch.Generator().manual_seed(0)
     spread = 0.02 * torch.tensor([4.0, 1.0])  # gentle enough for the limit of the offset's change
     drawn = torch.randn(10, 8, 2, generator=generator) * spread
     actions = (torch.round(drawn / GRID) * GRID).double().requires_grad_()
-    rewards, seen, fell = walked_total(task, actions)
+    rewards, seen, fell = walked_total(task, actions, options)
     (by_reward,) = torch.autograd.grad(rewards, actions, retain_graph=True)
     (by_seen,) = torch.autograd.grad(seen, actions)
     for place in ((0, 0, 0), (0, 1, 1), (4, 2, 0), (5, 3, 1), (9, 4, 0), (9, 5, 1)):
         shift = torch.zeros_like(actions)
         shift[place] = GRID
         with torch.no_grad():
-            ahead, behind = walked_total(task, actions + shift), walked_total(task, actions - shift)
+            ahead = walked_total(task, actions + shift, options)
+            behind = walked_total(task, actions - shift, options)
         assert ahead[2] == behind[2] == fell
         # third derivatives of order 10 times the grid's square
         difference = (ahead[0] - behind[0]) / (2.0 * GRID)

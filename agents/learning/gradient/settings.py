@@ -38,7 +38,7 @@ class GradientSettings:
         They show the policy states that it would not come to by itself. None leaves the environment as it is.
     """
 
-    steps: int = 160_000
+    steps: int = 100_000
     walkers: int = 64
     window: int = 32
     learning_rate: float = 3e-3
@@ -48,8 +48,8 @@ class GradientSettings:
     critic_batches: int = 8
     critic_first: int = 16_000
     critic_memory: float = 0.8
-    time_constant: float = 24.0
-    trace: float = 0.95
+    time_constant: float = 12.0
+    trace: float = 0.99
     exploration: float = 0.05
     largest_gradient: float = 1.0
     hidden: tuple[int, ...] = (64, 64)
