@@ -9,7 +9,7 @@ of the forces has no bound where the normal force vanishes: there the greatest f
 from __future__ import annotations
 
 from lean_yaw_env.kernel import verner
-from lean_yaw_env.kernel.compilation import inlined
+from lean_yaw_env.kernel.compilation import fused
 
 _LOOKS = (0.0, verner.C7, verner.C6, verner.C9, 1.0)
 
@@ -36,7 +36,7 @@ _PLACE_1, _PLACE_2, _PLACE_3, _PLACE_4 = (
 )
 
 
-@inlined
+@fused
 def _between(weights, looks):
     return (
         weights[0] * looks[0]
@@ -47,7 +47,7 @@ def _between(weights, looks):
     )
 
 
-@inlined
+@fused
 def _worse(weights, normals, tangentials, least, normal, tangential):
     """Compare one more place with the worst so far: least normal force, and the two forces where their ratio is greatest."""
     n = _between(weights, normals)
@@ -56,13 +56,13 @@ def _worse(weights, normals, tangentials, least, normal, tangential):
     return min(least, n), n if more else normal, t if more else tangential
 
 
-@inlined
+@fused
 def _worse_look(n, t, least, normal, tangential):
     more = t * normal * normal > tangential * n * n
     return min(least, n), n if more else normal, t if more else tangential
 
 
-@inlined
+@fused
 def worst_contact(normals, tangentials):
     """Least normal force, and greatest squared ratio of tangential to normal force, of a step.
 

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from lean_yaw_env.kernel.compilation import inlined
+from lean_yaw_env.kernel.compilation import fused
 from lean_yaw_env.kernel.elementary import angle_of, quotient
 from lean_yaw_env.kernel.stance import kinetic_energy, mass_matrix, middle_of_masses
 from lean_yaw_env.kernel.swing import swing_axis
 
 
-@inlined
+@fused
 def landing_pose(stance, sin_a, cos_a, sin_twist, cos_twist):
     """The swing foot flat on the floor: heading change, pitch and twist, and the sines and cosines the impact needs."""
     y, e, s = swing_axis(stance, sin_a, cos_a, sin_twist, cos_twist)
     axis_x = stance.cos_inter_leg * sin_a + stance.sin_inter_leg * cos_twist * cos_a
-    sin_heading = quotient(stance.sin_inter_leg * sin_twist, s)
-    cos_heading = quotient(axis_x, s)
-    new_sin_twist = quotient(sin_twist * sin_a, s)
-    new_cos_twist = quotient(e, s)
+    per_s = quotient(1.0, s)
+    sin_heading = stance.sin_inter_leg * sin_twist * per_s
+    cos_heading = axis_x * per_s
+    new_sin_twist = sin_twist * sin_a * per_s
+    new_cos_twist = e * per_s
     heading_change = angle_of(sin_heading, cos_heading)
     new_pitch = angle_of(s, -y) - stance.tilt
     new_twist = angle_of(new_sin_twist, new_cos_twist)
@@ -25,7 +26,7 @@ def landing_pose(stance, sin_a, cos_a, sin_twist, cos_twist):
     )  # fmt: skip
 
 
-@inlined
+@fused
 def landing_place(
     stance,
     pitch,
@@ -59,7 +60,7 @@ def landing_place(
     return pivot_x + rolled * cos_heading, pivot_z - rolled * sin_heading
 
 
-@inlined
+@fused
 def impact(
     stance, sin_a, cos_a, sin_twist, cos_twist, pitch_rate, twist_rate, offset, offset_rate,
     new_sin_a, new_cos_a, new_sin_twist, new_cos_twist,
@@ -102,7 +103,7 @@ def impact(
     return new_pitch_rate, new_twist_rate, before, after
 
 
-@inlined
+@fused
 def _to_new_foot(stance, v1, va, v3, sin_twist, cos_twist, new_sin_twist, new_cos_twist):
     """A vector's components in the new foot's e1, a, e3: undo the old ankle, the inter-leg angle, then the new ankle."""
     leg1 = cos_twist * v1 - sin_twist * v3

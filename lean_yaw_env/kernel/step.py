@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lean_yaw_env.kernel.compilation import entry_point, inlined
+from lean_yaw_env.kernel.compilation import entry_point, fused, inlined
 from lean_yaw_env.kernel.elementary import quotient, sine_cosine, within_half_turn
 from lean_yaw_env.kernel.flight import (
     advance,
@@ -47,9 +47,10 @@ from lean_yaw_env.kernel.swing import foot_gap
 
 # The gap before the last correction, which squares it: above this, the landing was not found.
 LANDING_RESIDUAL = 1e-7
+_SIXTH = 1.0 / 6.0
 
 
-@inlined
+@fused
 def stance_of(body, command, heading, side):
     """Constants of a step. On a slope that turns with the walker, downhill is where the stance foot heads."""
     sin_tilt, cos_tilt = sine_cosine(body.ankle_tilt)
@@ -79,7 +80,7 @@ def stance_of(body, command, heading, side):
     )
 
 
-@inlined
+@fused
 def start(stance, body, pitch, twist, pitch_rate, twist_rate):
     """The flight just after heel strike: it may be a fall already, or (as an option) an immediate heel strike."""
     sin_a, cos_a = sine_cosine(pitch + stance.tilt)
@@ -96,7 +97,9 @@ def start(stance, body, pitch, twist, pitch_rate, twist_rate):
     _, _, m11, m12, m22 = mass_matrix(stance, sin_a, cos_a, sin_twist, z, q, dq)
 
     first = first_step_length(
-        time_to_touch(gap.real, gap_rate.real, gap_acceleration.real), shift_end_of(stance).real
+        time_to_touch(gap.real, gap_rate.real, gap_acceleration.real),
+        shift_end_of(stance).real,
+        stance.offset_change.real,
     )
     buried = gap.real <= 0.0
     strikes = buried & (body.strike_at_start.real != 0.0)
@@ -115,7 +118,7 @@ def start(stance, body, pitch, twist, pitch_rate, twist_rate):
     )  # fmt: skip
 
 
-@inlined
+@fused
 def short_step(c, t, x, b, w, v, dw1, dv1, h):
     """One classical Runge-Kutta step of fourth order, for the last stretch to the landing; also the damping's loss."""
     half = 0.5 * h
@@ -128,7 +131,7 @@ def short_step(c, t, x, b, w, v, dw1, dv1, h):
     w4 = w + h * dw3
     v4 = v + h * dv3
     dw4, dv4 = accelerations(c, t + h, x + h * w3, b + h * v3, w4, v4)
-    sixth = h / 6.0
+    sixth = h * _SIXTH
     return (
         x + sixth * (w + 2.0 * (w2 + w3) + w4),
         b + sixth * (v + 2.0 * (v2 + v3) + v4),
@@ -138,7 +141,7 @@ def short_step(c, t, x, b, w, v, dw1, dv1, h):
     )
 
 
-@inlined
+@fused
 def touch_down(stance, flight):
     """Follow a landing flight to where the gap is zero, to round-off: a short step, then two Newton corrections in time.
 
@@ -161,8 +164,8 @@ def touch_down(stance, flight):
         gap, gap_rate, _, _ = foot_gap(stance, sin_a, cos_a, sin_twist, cos_twist, w, v, dw, dv)
         correction = quotient(-gap, gap_rate)
         time = time + correction
-        x = x + correction * (w + correction * (0.5 * dw + quotient(correction * jerk_w, 6.0)))
-        b = b + correction * (v + correction * (0.5 * dv + quotient(correction * jerk_v, 6.0)))
+        x = x + correction * (w + correction * (0.5 * dw + _SIXTH * correction * jerk_w))
+        b = b + correction * (v + correction * (0.5 * dv + _SIXTH * correction * jerk_v))
         w = w + correction * (dw + 0.5 * correction * jerk_w)
         v = v + correction * (dv + 0.5 * correction * jerk_v)
         dw = dw + correction * jerk_w
@@ -171,7 +174,7 @@ def touch_down(stance, flight):
     return time, x, b, w, v, gap, flight.damping_loss + loss
 
 
-@inlined
+@fused
 def finish(stance, heading, flight):
     """The outcome of a flight that has ended: the heel strike of one that lands, the last state of one that fell."""
     landing = flight.status == LANDING

@@ -6,14 +6,14 @@ axle, its ankle axis makes the angle A' with the floor's normal, sin A' = S = sq
 
 from __future__ import annotations
 
-from lean_yaw_env.kernel.compilation import inlined
+from lean_yaw_env.kernel.compilation import fused
 from lean_yaw_env.kernel.elementary import quotient, square_root
 
 # S is positive unless the swing leg's ankle axis is vertical, which no landing leg's is; this only keeps division defined.
 _LEAST_SQUARE = 1e-12
 
 
-@inlined
+@fused
 def swing_axis(stance, sin_a, cos_a, sin_twist, cos_twist):
     """Height components Y (ankle axis), E (the leg's e1) and S of the swing leg."""
     y = stance.sin_inter_leg * cos_twist * sin_a - stance.cos_inter_leg * cos_a
@@ -24,7 +24,7 @@ def swing_axis(stance, sin_a, cos_a, sin_twist, cos_twist):
     return y, e, square_root(square)
 
 
-@inlined
+@fused
 def axis_motion(
     stance, sin_a, cos_a, sin_twist, cos_twist, pitch_rate, twist_rate,
     pitch_acceleration, twist_acceleration, y, e,
@@ -57,7 +57,7 @@ def axis_motion(
     return y_rate, y_acceleration, e_rate, e_acceleration
 
 
-@inlined
+@fused
 def gap_motion(
     stance, sin_a, cos_a, sin_twist, cos_twist, pitch_rate, twist_rate,
     pitch_acceleration, twist_acceleration,
@@ -71,8 +71,9 @@ def gap_motion(
 
     pp = pitch_rate * pitch_rate
     tt = twist_rate * twist_rate
-    s_rate = quotient(-y * y_rate, s)
-    s_acceleration = quotient(-(y_rate * y_rate + y * y_acceleration + s_rate * s_rate), s)
+    per_s = quotient(-1.0, s)
+    s_rate = per_s * (y * y_rate)
+    s_acceleration = per_s * (y_rate * y_rate + y * y_acceleration + s_rate * s_rate)
     k_rate = k_b * twist_rate
     k_acceleration = k_bb * tt + k_b * twist_acceleration
 
@@ -97,7 +98,7 @@ def gap_motion(
     return gap, gap_rate, gap_acceleration
 
 
-@inlined
+@fused
 def foot_gap(
     stance,
     sin_a,

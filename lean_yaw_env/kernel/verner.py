@@ -9,7 +9,7 @@ Each function takes one component: its value ``y``, the step ``h`` and the stage
 a model of any number of coordinates is written out in straight lines that a compiler can vectorise over walkers.
 """
 
-from lean_yaw_env.kernel.compilation import inlined
+from lean_yaw_env.kernel.compilation import fused
 
 STAGES = 13
 ORDER = 8
@@ -105,54 +105,54 @@ E12 = -0.2361324633071542
 E13 = 0.36016794372897754
 
 
-@inlined
+@fused
 def stage_2(y, h, k1):
     return y + h * (A2_1 * k1)
 
 
-@inlined
+@fused
 def stage_3(y, h, k1, k2):
     return y + h * (A3_1 * k1 + A3_2 * k2)
 
 
-@inlined
+@fused
 def stage_4(y, h, k1, k3):
     return y + h * (A4_1 * k1 + A4_3 * k3)
 
 
-@inlined
+@fused
 def stage_5(y, h, k1, k3, k4):
     return y + h * (A5_1 * k1 + A5_3 * k3 + A5_4 * k4)
 
 
-@inlined
+@fused
 def stage_6(y, h, k1, k4, k5):
     return y + h * (A6_1 * k1 + A6_4 * k4 + A6_5 * k5)
 
 
-@inlined
+@fused
 def stage_7(y, h, k1, k4, k5, k6):
     return y + h * (A7_1 * k1 + A7_4 * k4 + A7_5 * k5 + A7_6 * k6)
 
 
-@inlined
+@fused
 def stage_8(y, h, k1, k4, k5, k6, k7):
     return y + h * (A8_1 * k1 + A8_4 * k4 + A8_5 * k5 + A8_6 * k6 + A8_7 * k7)
 
 
-@inlined
+@fused
 def stage_9(y, h, k1, k4, k5, k6, k7, k8):
     return y + h * (A9_1 * k1 + A9_4 * k4 + A9_5 * k5 + A9_6 * k6 + A9_7 * k7 + A9_8 * k8)
 
 
-@inlined
+@fused
 def stage_10(y, h, k1, k4, k5, k6, k7, k8, k9):
     return y + h * (
         A10_1 * k1 + A10_4 * k4 + A10_5 * k5 + A10_6 * k6 + A10_7 * k7 + A10_8 * k8 + A10_9 * k9
     )
 
 
-@inlined
+@fused
 def stage_11(y, h, k1, k4, k5, k6, k7, k8, k9, k10):
     return y + h * (
         A11_1 * k1
@@ -166,7 +166,7 @@ def stage_11(y, h, k1, k4, k5, k6, k7, k8, k9, k10):
     )
 
 
-@inlined
+@fused
 def stage_12(y, h, k1, k4, k5, k6, k7, k8, k9, k10, k11):
     return y + h * (
         A12_1 * k1
@@ -181,7 +181,7 @@ def stage_12(y, h, k1, k4, k5, k6, k7, k8, k9, k10, k11):
     )
 
 
-@inlined
+@fused
 def stage_13(y, h, k1, k4, k5, k6, k7, k8, k9, k10):
     return y + h * (
         A13_1 * k1
@@ -195,7 +195,7 @@ def stage_13(y, h, k1, k4, k5, k6, k7, k8, k9, k10):
     )
 
 
-@inlined
+@fused
 def result(y, h, k1, k6, k7, k8, k9, k10, k11, k12):
     """The eighth-order result at the end of the step."""
     return y + h * (
@@ -203,7 +203,7 @@ def result(y, h, k1, k6, k7, k8, k9, k10, k11, k12):
     )
 
 
-@inlined
+@fused
 def error(h, k1, k6, k7, k8, k9, k10, k11, k12, k13):
     """The result's difference from the embedded seventh-order one."""
     return h * (
