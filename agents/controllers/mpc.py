@@ -153,6 +153,7 @@ class MpcController:
         knots = (len(block), len(settings.knots), _DIRECTIONS)
         mean, deviation = np.zeros(knots), np.broadcast_to(spread, knots)
         best, most = base, np.full(len(block), -np.inf)
+        of_base = most
         tables = self._tables[self._memory(block, c.STEPS).astype(np.int64) % _TABLES]
         for iteration in range(settings.iterations):
             tried = mean[:, None] + deviation[:, None] * tables[:, iteration]
@@ -168,12 +169,14 @@ class MpcController:
             mean, deviation = self._narrowed(tried, worth, iteration == 0)
             deviation = np.maximum(deviation, _FLOOR * spread)
             if iteration == 0:
+                of_base = worth[:, 1]
                 # what was tried around the plan left says nothing about the base's, if that is where to search on
                 changes = (worth[:, 1] > worth[:, 0])[:, None, None]
                 centre = np.where(changes, base, centre)
                 mean = np.where(changes, 0.0, mean)
                 deviation = np.where(changes, 0.5 * spread, deviation)
-        return best
+        # what looks little better need not be: the judgement ends somewhere, and foresees no pushes or too few
+        return np.where((most > of_base + settings.margin)[:, None, None], best, base)
 
     def _narrowed(self, tried: Vector, worth: Vector, has_base: bool) -> tuple[Vector, Vector]:
         """Mean and standard deviation of the best of what was tried; the base's plan was not drawn."""

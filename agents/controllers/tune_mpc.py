@@ -61,6 +61,7 @@ def suggested(trial: optuna.Trial, task: str) -> MpcSettings:
         window=trial.suggest_float("window", 4.0, 40.0, log=True),
         step_price=trial.suggest_float("step_price", 0.0, 0.1),
         trust=trial.suggest_float("trust", 0.01, 100.0, log=True),
+        margin=trial.suggest_float("margin", 0.0, 3.0),
         scenarios=scenarios,
         push_scale=trial.suggest_float("push_scale", 0.5, 3.0) if scenarios else 1.0,
     )
