@@ -79,7 +79,6 @@ class GradientSettings:
 
 SETTINGS: dict[str, GradientSettings] = {
     "LeanYaw/SpeedHeading-v0": GradientSettings(steps=600_000),
-    "LeanYaw/Level-v0": GradientSettings(steps=600_000),
     # under the task's own pushes falls end most windows, and half the policies fell
     "LeanYaw/Slalom-v0": GradientSettings(steps=400_000, window=48, push_level=0.05),
 }
