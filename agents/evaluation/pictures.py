@@ -92,8 +92,8 @@ def save_agents_footprints(
     parameters = (EnvOptions() if options is None else options).walker_parameters(task_named(task))
     titled = {_title(name, episode): episode for name, episode in episodes.items()}
     low, high = _extent(list(titled.values()))
-    columns = min(_COLUMNS, len(titled))
-    lines = math.ceil(len(titled) / columns)
+    lines = math.ceil(len(titled) / _COLUMNS)
+    columns = math.ceil(len(titled) / lines)  # lines of equal length, but for the last
     shape = min(max((high[0] - low[0]) / (high[1] - low[1]), 0.6), 3.0)
     width = min(2.8, 7.0 / shape)
     figure = new_figure(width * columns + 0.8, (width * shape + 0.7) * lines + 0.3)
