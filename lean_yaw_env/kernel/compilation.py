@@ -25,8 +25,9 @@ from lean_yaw_env.kernel import fusing
 # A division by zero gives inf or nan as in C: Python's exception would be a branch, and a branch stops vectorisation.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 
-# Numba's type hints know neither its extension options nor what a dispatcher keeps
+# Numba's type hints know neither its extension options, nor its settings, nor what a dispatcher keeps
 _njit: Any = njit
+_config: Any = config
 _overload: Any = overload
 
 inlined = _njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
@@ -34,7 +35,7 @@ inlined = _njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True
 
 def fused(function: Any) -> Any:
     """Mark a formula of floats as ``inlined`` does, with products and sums fused; see ``fusing``."""
-    return function if config.DISABLE_JIT else inlined(fusing.fuse(function))
+    return function if _config.DISABLE_JIT else inlined(fusing.fuse(function))
 
 
 def borrowed(array: Any) -> Any:
