@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -329,13 +329,26 @@ def test_no_meeting_of_real_roots_is_missed_or_made_up(parameters):
         assert np.any((meetings >= grid[i]) & (meetings <= grid[i + 1]))
 
 
+# Two real modes that come near each other below 0.1 m/s, where long and short steps once told them apart differently
+CLOSE_MODES = replace(
+    BENCHMARK_2007,
+    wheelbase=0.953125,
+    trail=0.0,
+    steer_axis_tilt=0.01171875,
+    rear_frame=replace(BENCHMARK_2007.rear_frame, mass=106.25, x=0.225, z=-1.0265625),
+    front_frame=replace(BENCHMARK_2007.front_frame, mass=4.5, x=1.1671875, z=-0.896875),
+    front_wheel=replace(BENCHMARK_2007.front_wheel, radius=0.415625),
+)
+
+
 @settings(max_examples=12, deadline=None)
 @given(parameters=bicycles)
+@example(parameters=CLOSE_MODES)
 def test_modes_followed_do_not_depend_on_the_grid(parameters):
     bicycle = benchmark_bicycle(parameters)
     fine = follow_eigenvalues(bicycle, np.linspace(0.0, 10.0, 201))
     coarse = follow_eigenvalues(bicycle, fine.speeds[::50][::-1])
-    # The same matrices, so the same numbers, in reverse order.
+    # The same matrices by the same steps, so the same numbers, in reverse order.
     np.testing.assert_array_equal(coarse.eigenvalues[::-1], fine.eigenvalues[::50])
     np.testing.assert_array_equal(coarse.mode_shapes[::-1], fine.mode_shapes[::50])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -92,10 +93,11 @@ def follow_eigenvalues(bicycle: LinearBicycle, speeds: ArrayLike) -> EigenvalueB
     ordered, place = np.unique(requested, return_inverse=True)
     found: dict[float, _Modes] = {}
     for side in (ordered[ordered >= start.speed], ordered[ordered < start.speed][::-1]):
-        modes = start
+        modes = start  # on its own steps, so that no speed's result depends on the others
         for speed in side:
-            modes = _follow_to(bicycle, modes, float(speed))
-            found[float(speed)] = modes
+            while abs(speed - modes.speed) > _longest_step(bicycle, modes):
+                modes = _step(bicycle, modes, math.copysign(math.inf, speed - modes.speed))
+            found[float(speed)] = _follow_to(bicycle, modes, float(speed))
     rows = [found[float(speed)] for speed in ordered[place.reshape(-1)]]
     return EigenvalueBranches(
         speeds=requested,
@@ -126,17 +128,26 @@ def _name_modes(bicycle: LinearBicycle) -> _Modes:
 
 
 def _follow_to(bicycle: LinearBicycle, modes: _Modes, speed: float) -> _Modes:
-    """Follow the modes to another speed, halving the step until the assignment is clear."""
+    """Follow the modes to another speed."""
     while modes.speed != speed:
-        longest = _LONGEST_STEP * max(modes.speed, bicycle.characteristic.speed_scale)
-        step = float(np.clip(speed - modes.speed, -longest, longest))
-        whole = abs(speed - modes.speed) <= longest
-        following, is_clear = _assign(bicycle, modes, speed if whole else modes.speed + step)
-        while not is_clear and abs(step) > _SHORTEST_STEP * longest:
-            step *= 0.5
-            following, is_clear = _assign(bicycle, modes, modes.speed + step)
-        modes = following
+        modes = _step(bicycle, modes, speed)
     return modes
+
+
+def _longest_step(bicycle: LinearBicycle, modes: _Modes) -> float:
+    return _LONGEST_STEP * max(modes.speed, bicycle.characteristic.speed_scale)
+
+
+def _step(bicycle: LinearBicycle, modes: _Modes, speed: float) -> _Modes:
+    """Follow the modes a step towards a speed, halving it until the assignment is clear."""
+    longest = _longest_step(bicycle, modes)
+    step = float(np.clip(speed - modes.speed, -longest, longest))
+    whole = abs(speed - modes.speed) <= longest
+    following, is_clear = _assign(bicycle, modes, speed if whole else modes.speed + step)
+    while not is_clear and abs(step) > _SHORTEST_STEP * longest:
+        step *= 0.5
+        following, is_clear = _assign(bicycle, modes, modes.speed + step)
+    return following
 
 
 def _assign(bicycle: LinearBicycle, modes: _Modes, speed: float) -> tuple[_Modes, bool]:
