@@ -71,7 +71,7 @@ def results_table(rows: Sequence[Row]) -> Table:
         padding=(0, 0),
         pad_edge=False,
     )
-    table.add_column("metric", min_width=16)  # five agents and it fit a terminal of 80 columns
+    table.add_column("metric", width=16)  # five agents and it fit a terminal of 80 columns
     for agent in agents:
         table.add_column(agent, justify="right", no_wrap=True)
     for metric in metrics:
@@ -111,4 +111,4 @@ def estimate(row: Row, *, mean: bool) -> tuple[float, float, float]:
 
 def number(value: float) -> str:
     """As many digits as intervals of some thousand episodes leave."""
-    return f"{value:.1f}" if abs(value) >= 20.0 else f"{value:.3f}"
+    return f"{value:.1f}" if abs(value) >= 10.0 else f"{value:.3f}"
