@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from lean_yaw_env.rendering.files import written_whole
+from lean_yaw_env.files import written_whole
 
 _INFINITIES = {"inf": math.inf, "-inf": -math.inf}
 

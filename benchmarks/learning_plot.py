@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
-from lean_yaw_env.rendering.files import written_whole
+from lean_yaw_env.files import written_whole
 
 COLOURS = {"apg": "#1b6ca8", "ppo": "#c05a1d"}
 NAMES = {"apg": "gradient agent", "ppo": "PPO"}

@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.kernel.records import Body
+from lean_yaw_env.validation import require_array, require_choice, require_flag, require_number
 
 Foot = Literal["left", "right"]
+FEET: tuple[Foot, Foot] = ("left", "right")
 EarlyContact = Literal["trip", "strike"]
 Vector = NDArray[np.float64]
 
@@ -51,19 +53,6 @@ MIRROR = np.array([-1.0, 1.0, -1.0, 1.0, -1.0])
 MIRROR.flags.writeable = False
 
 QUARTER_TURN = 0.5 * math.pi
-
-
-def require_number(name: str, value: Any, low: float, high: float, bounds: str = "[]") -> float:
-    """Return ``value`` as float, or raise ``ValueError`` naming it and the allowed interval (``bounds``: brackets as in "[)")."""
-    text = f"{bounds[0]}{low:g}, {high:g}{bounds[1]}"
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise ValueError(f"{name} must be a number in {text}, not {value!r}")
-    number = float(value)
-    above = number > low or (bounds[0] == "[" and number == low)
-    below = number < high or (bounds[1] == "]" and number == high)
-    if not (above and below):
-        raise ValueError(f"{name} must be in {text}, not {value!r}")
-    return number
 
 
 @dataclass(frozen=True)
@@ -117,12 +106,8 @@ class WalkerParameters:
         for name, low, high, bounds in _RANGES:
             value = require_number(name, getattr(self, name), low, high, bounds)
             object.__setattr__(self, name, value)
-        if not isinstance(self.slope_turns, (bool, np.bool_)):
-            raise ValueError(f"slope_turns must be True or False, not {self.slope_turns!r}")
-        if self.early_contact not in ("trip", "strike"):
-            raise ValueError(
-                f"early_contact must be 'trip' or 'strike', not {self.early_contact!r}"
-            )
+        require_flag("slope_turns", self.slope_turns)
+        require_choice("early_contact", self.early_contact, ("trip", "strike"))
 
     def body(self) -> Body:
         """The same parameters as the kernels take them."""
@@ -157,27 +142,19 @@ PARAMETER_NAMES = tuple(field.name for field in fields(WalkerParameters))
 
 def require_state(state: ArrayLike | Sequence[float], name: str = "state") -> Vector:
     """Return a section state as float array of shape (5,), or raise ``ValueError`` naming the coordinate and its range."""
-    try:
-        array = np.array(state, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must hold {STATE_SIZE} numbers, not {state!r}") from error
-    if array.shape != (STATE_SIZE,):
-        names = ", ".join(field.name for field in STATE_FIELDS)
-        raise ValueError(f"{name} must have shape ({STATE_SIZE},): {names}; not {array.shape}")
+    array = require_array(name, state, (STATE_SIZE,), -math.inf, math.inf, "[]")
     for field, value in zip(STATE_FIELDS, array, strict=True):
         bound = QUARTER_TURN if field.name in ("stance_pitch", "ankle_angle") else 1e6
         if not abs(value) < bound:
             raise ValueError(
-                f"{name}: {field.name} must be in ({-bound:g}, {bound:g}), not {value}"
+                f"{name}: {field.name} must be in ({-bound:g}, {bound:g}), got {value}"
             )
     return array
 
 
 def require_foot(stance: Any) -> Foot:
     """Return "left" or "right", or raise ``ValueError``."""
-    if stance not in ("left", "right"):
-        raise ValueError(f"stance must be 'left' or 'right', not {stance!r}")
-    return stance
+    return require_choice("stance", stance, FEET)
 
 
 def require_inter_leg_angle(value: Any) -> float:

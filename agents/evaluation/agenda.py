@@ -28,8 +28,8 @@ from agents.registry import AgentRequest, agent_entry, env_id_of, make_agent
 from agents.seeds import MOST_EPISODES, evaluation_seed
 from agents.versions import package_versions
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.files import written_whole
 from lean_yaw_env.parameters import require_number
-from lean_yaw_env.rendering.files import written_whole
 
 _SHARE = 1024  # episodes walked side by side
 _COSTLY_SHARE = 20  # of an agent that plans: some tens of seconds

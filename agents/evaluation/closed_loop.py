@@ -34,7 +34,7 @@ from agents.evaluation.closed_loop_survival import (
 from agents.registry import AgentRequest, env_id_of, make_agent
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.errors import LeanYawError, NoGaitError
-from lean_yaw_env.rendering.files import written_whole
+from lean_yaw_env.files import written_whole
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 

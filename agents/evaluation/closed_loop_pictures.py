@@ -18,7 +18,7 @@ from agents.evaluation.closed_loop_report import ClosedLoopReport
 from agents.evaluation.closed_loop_survival import LargestPushes
 from agents.registry import AGENTS
 from lean_yaw_env.analysis.many_walks import ENDINGS
-from lean_yaw_env.rendering.files import written_whole
+from lean_yaw_env.files import written_whole
 from lean_yaw_env.rendering.palette import INK, STRONG_GRID, unit_colour
 from lean_yaw_env.rendering.picture import new_figure
 

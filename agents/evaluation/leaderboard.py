@@ -19,7 +19,7 @@ from agents.evaluation.tables import rows_to_csv
 from agents.registry import AgentRequest, env_id_of, make_agent
 from agents.seeds import evaluation_seed
 from agents.versions import package_versions
-from lean_yaw_env.rendering.files import written_whole
+from lean_yaw_env.files import written_whole
 
 PAGE_FILE = "leaderboard.md"
 NUMBERS_FILE = "leaderboard.csv"

@@ -17,8 +17,8 @@ from agents.evaluation.results import RETURN, Row
 from agents.learning.results import TrainingLog
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.files import written_whole
 from lean_yaw_env.parameters import Vector
-from lean_yaw_env.rendering.files import written_whole
 from lean_yaw_env.rendering.palette import COMMAND, GOAL, REFERENCE, unit_colour
 from lean_yaw_env.rendering.picture import draw_footprints, new_figure
 

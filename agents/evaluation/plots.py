@@ -15,7 +15,7 @@ from agents.evaluation.results import Row, is_share
 from agents.evaluation.tables import estimate
 from agents.registry import KINDS, Kind, agent_entry
 from lean_yaw_env.envs.tasks import task_named
-from lean_yaw_env.rendering.files import written_whole
+from lean_yaw_env.files import written_whole
 from lean_yaw_env.rendering.picture import new_figure
 
 _DPI = 150

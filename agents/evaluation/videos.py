@@ -22,9 +22,9 @@ from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.pictures import Footage
 from lean_yaw_env.envs.walker_env import WalkerEnv
+from lean_yaw_env.files import require_ending, written_whole
 from lean_yaw_env.parameters import Foot, Vector, require_number
 from lean_yaw_env.registration import TASK_VERSIONS
-from lean_yaw_env.rendering.files import require_ending, written_whole
 from lean_yaw_env.rendering.filming import (
     SECONDS_PER_TIME_UNIT,
     Frame,

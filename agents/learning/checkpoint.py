@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from torch.optim import Optimizer
 
 from lean_yaw_env.envs.sb3 import WalkerVecEnv
-from lean_yaw_env.rendering.files import written_whole
+from lean_yaw_env.files import written_whole
 
 Arrays = dict[str, NDArray[Any]]
 

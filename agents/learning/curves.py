@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.ticker import EngFormatter
 
 from agents.learning.results import TrainingLog
+from lean_yaw_env.files import written_whole
 from lean_yaw_env.parameters import Vector
-from lean_yaw_env.rendering.files import written_whole
 from lean_yaw_env.rendering.picture import new_figure
 
 WINDOW = 128

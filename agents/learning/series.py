@@ -33,7 +33,7 @@ from agents.learning.training import (
 from agents.policies.storage import task_of
 from agents.registry import env_id_of
 from agents.seeds import TRAINING_SEEDS
-from lean_yaw_env.rendering.files import written_whole
+from lean_yaw_env.files import written_whole
 
 SERIES_FILE = "series.json"
 CURVES_FILE = "learning_curves.png"

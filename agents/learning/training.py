@@ -31,8 +31,8 @@ from agents.registry import AgentRequest, env_id_of, make_all
 from agents.seeds import MOST_EPISODES, evaluation_seed, training_seed
 from agents.versions import package_versions
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.files import written_whole
 from lean_yaw_env.parameters import require_number
-from lean_yaw_env.rendering.files import written_whole
 
 RUN_FILE = "run.json"
 CHECKPOINT_FILE = "checkpoint.safetensors"

@@ -14,9 +14,9 @@ from agents.files import read_json, write_json
 from agents.observations import ObservationLayout
 from agents.policies.policy import Policy, PolicyCard, require_algorithm
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.files import written_whole
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.registration import ENV_IDS, NAMESPACE
-from lean_yaw_env.rendering.files import written_whole
 
 CARD_FILE = "policy.json"
 WEIGHTS_FILE = "policy.safetensors"

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lean_yaw_env.errors import LeanYawError
+from lean_yaw_env.files import written_whole
 from lean_yaw_env.paper.checks import VERDICTS, Check
 from lean_yaw_env.paper.registry import pieces_named
 from lean_yaw_env.paper.results import Columns, Piece, Result
-from lean_yaw_env.rendering.files import written_whole
 
 CHECK_COLUMNS = (
     "piece",

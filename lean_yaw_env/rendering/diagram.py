@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lean_yaw_env.files import require_ending, written_whole
 from lean_yaw_env.parameters import Foot, Vector, WalkerParameters
 from lean_yaw_env.rendering.camera import upward
-from lean_yaw_env.rendering.files import require_ending, written_whole
 from lean_yaw_env.rendering.footprints import footprint_length, footprint_outlines
 from lean_yaw_env.rendering.geometry import LegShape, Pose, WalkerShape, walker_shape
 from lean_yaw_env.rendering.palette import (

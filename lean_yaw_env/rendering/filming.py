@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lean_yaw_env.files import require_ending, written_whole
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector, require_number
-from lean_yaw_env.rendering.files import require_ending, written_whole
 from lean_yaw_env.rendering.geometry import Pose
 from lean_yaw_env.rendering.optional import require_ffmpeg, require_pillow, require_tqdm
 from lean_yaw_env.rendering.pygame_renderer import SIZE, Renderer

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from lean_yaw_env.files import require_ending, written_whole
 from lean_yaw_env.parameters import Foot, Vector
-from lean_yaw_env.rendering.files import require_ending, written_whole
 from lean_yaw_env.rendering.footprints import footprint_length, footprint_outlines
 from lean_yaw_env.rendering.optional import require_matplotlib
 from lean_yaw_env.rendering.palette import FOOT_COLOURS, INK, STRONG_GRID, unit_colour

@@ -1,0 +1,68 @@
+"""Files that are written whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import glob
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+_PREFIX = ".partial-"
+
+
+def require_ending(path: str | os.PathLike[str], endings: tuple[str, ...]) -> Path:
+    """Return ``path`` if it ends as asked and its folder exists, or raise ``ValueError``."""
+    place = Path(path)
+    if place.suffix.lower() not in endings:
+        raise ValueError(f"path must end with one of {', '.join(endings)}, got {str(place)!r}")
+    if not place.parent.is_dir():
+        raise ValueError(f"path must be in a folder that exists, got {str(place)!r}")
+    return place
+
+
+@contextlib.contextmanager
+def written_whole(path: Path) -> Iterator[Path]:
+    """A temporary file beside ``path`` that takes its place when the block ends well; its mode follows the process's umask.
+
+    What an earlier process left of the same file when it was killed is removed first.
+    """
+    remove_partial(path)
+    handle, name = tempfile.mkstemp(
+        prefix=f"{_PREFIX}{os.getpid()}-{path.stem}-", suffix=path.suffix, dir=path.parent
+    )
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        temporary.chmod(0o666 & ~_umask())  # mkstemp's files are for their owner alone
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def remove_partial(path: Path) -> None:
+    """Remove what processes that no longer run left of ``path`` while they wrote it."""
+    for left in path.parent.glob(f"{_PREFIX}*-{glob.escape(path.stem)}-*{path.suffix}"):
+        writer = left.name.removeprefix(_PREFIX).split("-", 1)[0]
+        if not (writer.isdigit() and _is_running(int(writer))):
+            left.unlink(missing_ok=True)
+
+
+def _is_running(process: int) -> bool:
+    if os.name == "nt":  # where signal 0 is no question but Ctrl-C
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # another user's
+        return True
+    return True
+
+
+def _umask() -> int:
+    mask = os.umask(0)  # it can only be read by setting it
+    os.umask(mask)
+    return mask

@@ -1,0 +1,99 @@
+"""Checks of arguments, used at every public edge: each returns the value in its plain type or raises ``ValueError``.
+
+A message names the argument, what is allowed and the value given: "slope must be a number in [-0.5, 0.5], got 'steep'".
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Collection
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Choice = TypeVar("Choice", bound=str)
+
+_NUMBERS = (int, float, np.integer, np.floating)
+
+
+def require_number(name: str, value: Any, low: float, high: float, bounds: str = "[]") -> float:
+    """Return a real number of an interval as float; ``bounds`` are its brackets, "[" and "]" where the end belongs to it."""
+    allowed = f"{bounds[0]}{low:g}, {high:g}{bounds[1]}"
+    if isinstance(value, bool) or not isinstance(value, _NUMBERS):
+        raise ValueError(f"{name} must be a number in {allowed}, got {value!r}")
+    number = float(value)
+    above = number > low or (bounds[0] == "[" and number == low)
+    below = number < high or (bounds[1] == "]" and number == high)
+    if not (above and below):
+        raise ValueError(f"{name} must be in {allowed}, got {value!r}")
+    return number
+
+
+def require_finite(name: str, value: Any) -> float:
+    """Return a finite number as float."""
+    return require_number(name, value, -math.inf, math.inf, "()")
+
+
+def require_count(name: str, value: Any, low: int = 1, high: int = 10_000_000) -> int:
+    """Return a whole number from ``low`` to ``high`` as int; 2.0 is none."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise ValueError(f"{name} must be a whole number from {low} to {high}, got {value!r}")
+    if not low <= value <= high:
+        raise ValueError(f"{name} must be from {low} to {high}, got {value!r}")
+    return int(value)
+
+
+def require_flag(name: str, value: Any) -> bool:
+    """Return True or False as bool."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValueError(f"{name} must be True or False, got {value!r}")
+    return bool(value)
+
+
+def require_choice(name: str, value: Any, choices: Collection[Choice]) -> Choice:
+    """Return one of some names; the message suggests the name that a misspelt one is closest to."""
+    for choice in choices:
+        if isinstance(value, str) and value == choice:
+            return choice
+    raise ValueError(
+        f"{name} must be one of {', '.join(choices)}, got {value!r}{suggestion(value, choices)}"
+    )
+
+
+def suggestion(value: Any, choices: Collection[str]) -> str:
+    """ "; did you mean X?" for a misspelt name, else nothing."""
+    close = difflib.get_close_matches(value, choices, 1) if isinstance(value, str) else []
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def require_array(
+    name: str,
+    value: ArrayLike,
+    shape: tuple[int | None, ...],
+    low: float = -math.inf,
+    high: float = math.inf,
+    bounds: str = "()",
+) -> NDArray[np.float64]:
+    """Return numbers of an interval, by default all finite ones, as a new float array of ``shape``; None there stands for any length."""
+    wanted = f"({', '.join('n' if n is None else str(n) for n in shape)}{',' if len(shape) == 1 else ''})"
+    allowed = f"{bounds[0]}{low:g}, {high:g}{bounds[1]}"
+    try:
+        given = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name} must hold numbers in shape {wanted}, got {value!r}") from error
+    if given.dtype.kind not in "iuf":
+        raise ValueError(f"{name} must hold numbers in shape {wanted}, got {value!r}")
+    fits = given.ndim == len(shape) and all(
+        n is None or n == m for n, m in zip(shape, given.shape, strict=True)
+    )
+    if not fits:
+        raise ValueError(f"{name} must have shape {wanted}, got {given.shape}")
+    array = np.array(given, dtype=np.float64, order="C")
+    above = array >= low if bounds[0] == "[" else array > low
+    below = array <= high if bounds[1] == "]" else array < high
+    inside = above & below
+    if not inside.all():
+        raise ValueError(f"{name} must hold numbers in {allowed}, got {array[~inside].flat[0]}")
+    return array
