@@ -205,7 +205,7 @@ def test_swing_foot_stays_over_the_floor_and_lands_where_the_contact_is_reported
     np.testing.assert_allclose(swing_pivot[-1], expected, atol=1e-11)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(nearby, headings, st.sampled_from(["left", "right"]), st.floats(-0.03, 0.03))
 def test_stance_keeps_energy_and_constraints_and_impact_takes_energy(
     factors: tuple[float, ...], heading: float, stance: str, offset: float
@@ -224,7 +224,7 @@ def test_stance_keeps_energy_and_constraints_and_impact_takes_energy(
         assert step.fall in FALLS
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(nearby, headings, st.floats(-0.03, 0.03))
 def test_a_mirrored_walker_walks_a_mirrored_step(
     factors: tuple[float, ...], heading: float, offset: float

@@ -25,7 +25,7 @@ skateboards = st.builds(
     gravity=st.floats(1.0, 25.0),
     damping=st.floats(0.0, 300.0),
 )
-few = settings(max_examples=60, deadline=None)
+few = settings(max_examples=60)
 
 
 # Laws
