@@ -475,15 +475,15 @@ def test_impossible_bicycle_is_refused_by_name(build, message):
     ],
 )
 def test_impossible_matrix_is_refused_by_name(name, matrix):
-    with pytest.raises(ValueError, match=f"{name} must be"):
+    with pytest.raises(ValueError, match=f"{name} must (be|have|hold)"):
         replace(paper_bicycle(), **{name: matrix})
 
 
 def test_bad_arguments_are_refused_by_name():
     bicycle = paper_bicycle()
-    with pytest.raises(ValueError, match="speeds must be finite"):
+    with pytest.raises(ValueError, match="speeds must hold finite numbers, got nan"):
         bicycle.eigenvalues(math.nan)
-    with pytest.raises(ValueError, match=r"speeds must be in \[0, inf\)"):
+    with pytest.raises(ValueError, match=r"speeds must hold numbers in \[0, inf\), got -1.0"):
         follow_eigenvalues(bicycle, [-1.0, 2.0])
     with pytest.raises(ValueError, match="steer must be a finite number"):
         bicycle.motion(1.0, [0.0], steer=math.inf)

@@ -9,8 +9,9 @@ from itertools import pairwise, permutations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lean_yaw_env.validation import require_vector
 from lean_yaw_env.vehicles.bicycle import LinearBicycle
-from lean_yaw_env.vehicles.linear_motion import ComplexArray, FloatArray, finite_vector
+from lean_yaw_env.vehicles.linear_motion import ComplexArray, FloatArray
 
 BRANCH_NAMES = ("weave_upper", "weave_lower", "capsize", "caster")
 """Order of the branches. The weave is two branches: a conjugate pair, positive frequency first, or
@@ -107,9 +108,7 @@ def follow_eigenvalues(bicycle: LinearBicycle, speeds: ArrayLike) -> EigenvalueB
     ValueError
         If a speed is negative or not finite.
     """
-    requested = finite_vector("speeds", speeds)
-    if np.any(requested < 0.0):
-        raise ValueError(f"speeds must be in [0, inf), got {requested.min()!r}")
+    requested = require_vector("speeds", speeds, 0.0, math.inf, "[)")
     start, names = _start(bicycle)
     ordered, place = np.unique(requested, return_inverse=True)
     found: dict[float, _Modes] = {}
@@ -183,7 +182,9 @@ def _assign(bicycle: LinearBicycle, modes: _Modes, speed: float) -> tuple[_Modes
     All 24 assignments are priced, for the runner-up's cost tells how clear the best one is.
     """
     values, shapes = bicycle.modes(speed)
-    distance = np.abs(modes.eigenvalues[:, None] - values[None, :]) / (np.max(np.abs(values)) or 1.0)
+    distance = np.abs(modes.eigenvalues[:, None] - values[None, :]) / (
+        np.max(np.abs(values)) or 1.0
+    )
     likeness = np.abs(modes.shapes.conj() @ shapes.T)
     cost = distance + 1.0 - np.minimum(likeness, 1.0)
     totals = cost[np.arange(4), _ASSIGNMENTS].sum(axis=1)
