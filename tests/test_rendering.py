@@ -30,6 +30,7 @@ from lean_yaw_env.rendering import (
 from lean_yaw_env.rendering.camera import Panel, body_camera, floor_camera, upward
 from lean_yaw_env.rendering.footprints import footprint_length, footprint_outlines
 from lean_yaw_env.rendering.palette import COMMAND, FOOT_COLOURS, GOAL, INK, LEFT, REFERENCE, RIGHT
+from lean_yaw_env.rendering.picture import footprint_figure
 from lean_yaw_env.walker import Walker
 
 # Table 2's gait (left stance) to the digits that a root finder gives
@@ -621,6 +622,25 @@ def test_footprints_of_several_walks_share_one_scale(walker):
         (path,) = place.lines
         np.testing.assert_array_equal(path.get_xdata(), walk.path[:, 3])
         np.testing.assert_array_equal(path.get_ydata(), walk.path[:, 1])
+
+
+@pytest.mark.parametrize("count", [1, 5, 7])
+def test_titles_and_labels_of_footprints_are_inside_the_picture(walker, count):
+    walks = {f"walk {k}": walker.walk(60, state=GAIT) for k in range(count)}
+    figure, panels = footprint_figure(walks, places=[(12.0, -3.0)])
+    figure.canvas.draw()
+    columns = 4 if count == 7 else count
+    for k, panel in enumerate(panels):
+        assert panel.get_title() == f"walk {k}"
+        shown = [panel.title]
+        shown += [panel.xaxis.label] if k + columns >= count else []
+        shown += [panel.yaxis.label] if k % columns == 0 else []
+        for text in shown:
+            box = text.get_window_extent()
+            assert text.get_visible() and text.get_text()
+            assert figure.bbox.containsx(box.x0) and figure.bbox.containsx(box.x1)
+            assert figure.bbox.containsy(box.y0) and figure.bbox.containsy(box.y1)
+        assert panel.get_xlim()[0] < -3.0
 
 
 def test_a_picture_of_footprints_is_written_whole(walker, tmp_path):
