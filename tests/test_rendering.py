@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.error import DependencyNotInstalled
@@ -411,6 +412,25 @@ def test_extreme_walkers_in_fallen_poses_are_drawn(renderer, parameters):
     assert len(coloured(frame, RIGHT)) > 50
 
 
+@pytest.mark.parametrize("right", [-4.0, 0.0, 4.0])
+def test_the_words_never_hide_the_walker(walker, renderer, right):
+    lines = status_lines(step=132, time=80.0, speed=0.4, heading=0.3, commanded_heading=0.5)
+    place = np.array([6.0, right])
+    goals = [Goal(0.0, -right, 0.5), Goal(0.0, 5.0, 0.5)]
+
+    def frame_with(lines):
+        pose = Pose(GAIT, contact=place)
+        path = np.array([[0.0, 0.0], place])
+        return renderer.frame(Scene(walker.parameters, pose, path=path, goals=goals, lines=lines))
+
+    words = np.any(frame_with(lines) != frame_with(()), axis=-1)
+    masses = coloured(frame_with(()), INK)
+    # The masses and the heading's arrow are what is dark in the view from above, without the scale's bar
+    body = masses[(masses[:, 1] < 560) & (masses[:, 0] < 480)]
+    assert words.any() and len(body) > 100
+    assert not words[body[:, 0], body[:, 1]].any()
+
+
 def test_an_array_needs_no_display_and_opens_none():
     script = (
         "import numpy as np, sys\n"
@@ -468,6 +488,18 @@ def test_without_a_display_a_window_says_so(walker, monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "no such driver")
     with pytest.raises(RuntimeError, match="no window could be opened"):
         Renderer().show(scene_of(walker, 1))
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere there is a display")
+def test_without_a_display_no_invisible_window_opens(monkeypatch):
+    import pygame
+
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
+        monkeypatch.delenv(name, raising=False)
+    env = gym.make("LeanYaw/Walk-v0", render_mode="human")
+    with pytest.raises(RuntimeError, match="there is no display"):
+        env.reset(seed=0)
+    assert not pygame.display.get_init()
 
 
 # Films

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ from lean_yaw_env.validation import require_count, require_number
 SIZE = (960, 540)
 """Width and height of a picture, pixels."""
 LEAST_SIZE, GREATEST_SIZE = (480, 360), (3840, 2160)
+_INVISIBLE = ("offscreen", "dummy", "evdev")
+"""SDL's drivers without a window, taken where there is no display; who names one in ``SDL_VIDEODRIVER`` wants it."""
 _GAP = 6.0
 _TOP_SHARE = 0.585  # of the width, for the view from above
 
@@ -90,14 +93,18 @@ class Renderer:
 
     def _opened_window(self) -> Any:
         if self._window is None:
+            display = self._pygame.display
             try:
-                self._pygame.display.init()
-                self._window = self._pygame.display.set_mode(self.size)
+                display.init()
+                if display.get_driver() in _INVISIBLE and "SDL_VIDEODRIVER" not in os.environ:
+                    display.quit()
+                    raise self._pygame.error("there is no display")
+                self._window = display.set_mode(self.size)
             except self._pygame.error as error:
                 raise RuntimeError(
                     f"no window could be opened ({error}); without a display, ask for arrays"
                 ) from error
-            self._pygame.display.set_caption("Lean-to-yaw walker")
+            display.set_caption("Lean-to-yaw walker")
             self._clock = self._pygame.time.Clock()
         return self._window
 
