@@ -770,9 +770,12 @@ def test_pictures_of_footprints_refuse_what_they_cannot_draw(walker, tmp_path):
     ("module", "draw"),
     [
         ("pygame", lambda folder: Renderer()),
-        ("matplotlib", lambda folder: draw_walker(WalkerParameters(), folder / "walker.png")),
+        (
+            "matplotlib.figure",
+            lambda folder: draw_walker(WalkerParameters(), folder / "walker.png"),
+        ),
         ("imageio_ffmpeg", lambda folder: film(Walker(), 1, folder / "walk.mp4", state=GAIT)),
-        ("PIL.Image", lambda folder: film(Walker(), 1, folder / "walk.gif", state=GAIT)),
+        ("PIL", lambda folder: film(Walker(), 1, folder / "walk.gif", state=GAIT)),
         ("tqdm", lambda folder: film(Walker(), 1, folder / "walk.mp4", state=GAIT)),
     ],
 )

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.rendering.body_views import draw_rear_view, draw_side_view
 from lean_yaw_env.rendering.camera import Panel
 from lean_yaw_env.rendering.canvas import Canvas
 from lean_yaw_env.rendering.geometry import walker_shape
-from lean_yaw_env.rendering.optional import require_pygame
 from lean_yaw_env.rendering.palette import BACKGROUND
 from lean_yaw_env.rendering.scene import Scene
 from lean_yaw_env.rendering.top_view import draw_top_view
@@ -45,7 +45,9 @@ class Renderer:
 
     def __init__(self, size: tuple[int, int] = SIZE) -> None:
         self.size = _require_size(size)
-        self._pygame = require_pygame()
+        with needs_extra("render"):
+            import pygame
+        self._pygame: Any = pygame
         self._canvas = Canvas(*self.size, BACKGROUND)
         self._window: Any = None
         self._clock: Any = None
