@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -19,6 +20,7 @@ RESULTS = Path(__file__).parent / "results"
 
 def main() -> None:
     """Measure all, print it, and keep it."""
+    argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__).parse_args()
     figures = []
     for benchmark in (kernel, environments, startup, training):
         measured = benchmark.run(smallest=False)
