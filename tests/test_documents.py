@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import json
 import os
 import re
 import subprocess
@@ -10,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.kernel.flight import (
     BACKWARD_RATE,
     LANDING_WINDOW,
@@ -86,3 +89,50 @@ def test_the_page_of_the_model_states_the_thresholds_of_the_code() -> None:
         f"within {LANDING_WINDOW:g} units of time ({SHIFTING_LANDING_WINDOW:g} while the masses move)"
         in text
     )
+
+
+def _readme_results() -> list[tuple[str, str, str]]:
+    """(task, agent, cell) of the README's table of results."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    lines = text.split("| task | mean |")[1].split("\n\n")[0].splitlines()
+    agents = [name.strip() for name in lines[0].strip("|").split("|")]
+    cells = []
+    for line in lines[2:]:
+        task, _, *values = [cell.strip() for cell in line.strip("|").split("|")]
+        cells += [(task, agent, cell) for agent, cell in zip(agents, values, strict=True)]
+    return cells
+
+
+def test_results_in_the_readme_are_those_of_the_leaderboard() -> None:
+    with (ROOT / "docs" / "leaderboard.csv").open(encoding="utf-8") as file:
+        rows = {(row["task"], row["agent"], row["metric"]): row for row in csv.DictReader(file)}
+    for task, agent, cell in _readme_results():
+        row = rows.get((task, agent, task_named(task).headline))
+        assert (row is None) == (cell == ""), (task, agent)
+        if row is not None:
+            bold = row["verdict"] == "better"
+            mean = float(row["mean"])
+            text = (
+                f"{100 * mean:.1f} %"
+                if task == "Push"
+                else f"{mean:.{2 if task == 'Waypoint' else 1}f}"
+            )
+            assert cell == (f"**{text}**" if bold else text), (task, agent)
+
+
+def test_speeds_in_the_readme_are_those_measured() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    kept = json.loads((ROOT / "benchmarks/results/full.json").read_text(encoding="utf-8"))
+    million = 1e-6
+    ppo = kept["training_collecting"] + kept["training_update"]
+    for part in (
+        f"{million * kept['batch_steps_per_second']:.1f} million walking steps per second, "
+        f"{round(kept['batch_over_solve_ivp'], -2):,.0f} times",
+        f"{million * kept['vector_1024_fixed_steps_per_second']:.1f} million steps per second, "
+        f"{kept['vector_over_sync_cartpole']:.0f} times",
+        f"{million * kept['vector_1024_random_steps_per_second']:.1f} million steps per second, "
+        f"{kept['random_vector_over_sync_cartpole']:.0f} times",
+        f"{kept['single_call']:.1f} µs; {kept['jacobian_call']:.0f} µs; {kept['step_heading']:.1f} µs",
+        f"{ppo:.0f} µs per step, of which the gradient updates take {kept['training_update']:.0f} µs",
+    ):
+        assert part in text
