@@ -227,7 +227,7 @@ def test_the_basin_holds_the_gait_and_shrinks_as_more_steps_are_asked_for():
     assert few.centre == (FIXED.start[2], FIXED.start[4])
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(ankle=st.floats(-0.3, 0.3), pitch_rate=st.floats(-0.4, 0.4), ankle_rate=st.floats(-0.8, 0.8))
 def test_a_walk_ends_as_the_environments_episode_does(ankle, pitch_rate, ankle_rate):
     state = FEEDBACK.start.copy()

@@ -116,7 +116,7 @@ def test_reproduce_for_people_names_the_files(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (["gait", "--ankle-tilt", "3"], "ankle_tilt must be in (0, 1.5708], not 3.0"),
+        (["gait", "--ankle-tilt", "3"], "ankle_tilt must be in (0, 1.5708], got 3.0"),
         (["gait", "--inter-leg-angle", "-1"], "inter_leg_angle"),
         (["gait", "--planar"], "--passive"),
         (["gait", "--passive", "--mass-offset", "0.1"], "mass_offset"),

@@ -251,7 +251,7 @@ def test_walk_agrees_with_single_steps() -> None:
     assert walk.inter_leg_angles.shape == (len(walk.states),)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.tuples(*(st.floats(-1.0, 1.0) for _ in range(6))), st.sampled_from(["left", "right"]))
 def test_any_start_ends_in_a_step_or_a_named_fall(shares, stance) -> None:
     state = np.array([0.3, 0.1, 0.2, 0.4, 0.4, 0.5]) * shares + [0, 0.2, 0, -0.3, 0, 0]

@@ -11,7 +11,6 @@ import numpy as np
 
 from lean_yaw_env.analysis import LimitCycle, modes
 from lean_yaw_env.vehicles import (
-    BRANCH_NAMES,
     LinearBicycle,
     Skateboard,
     critical_speed,
@@ -120,7 +119,7 @@ def bicycle_record(bicycle: LinearBicycle, speeds: Vector) -> Record:
         "capsize_speed": bicycle.capsize_speed(),
         "stable_speeds": None if limits is None else list(limits),
         "eigenvalues": [
-            {"speed": speed, **dict(zip(BRANCH_NAMES, row, strict=True))}
+            {"speed": speed, **dict(zip(branches.names, row, strict=True))}
             for speed, row in zip(branches.speeds, branches.eigenvalues, strict=True)
         ],
     }

@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.files import require_ending, written_whole
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector, require_number
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector
 from lean_yaw_env.rendering.geometry import Pose
 from lean_yaw_env.rendering.optional import require_ffmpeg, require_pillow, require_tqdm
 from lean_yaw_env.rendering.pygame_renderer import SIZE, Renderer
 from lean_yaw_env.rendering.scene import Scene, status_lines
+from lean_yaw_env.validation import require_number
 from lean_yaw_env.walker import Walk, Walker
 
 SECONDS_PER_TIME_UNIT = 1.0 / math.sqrt(9.81)
@@ -143,7 +144,7 @@ def _record(
         commanded = np.asarray(commanded_heading, dtype=float)
         if commanded.shape not in ((), (n_steps,)):
             raise ValueError(
-                f"commanded_heading must be one number or {n_steps}, not shape {commanded.shape}"
+                f"commanded_heading must be one number or {n_steps}, got shape {commanded.shape}"
             )
         commanded = np.broadcast_to(commanded, n_steps)
     durations = walk.durations.tolist()

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from lean_yaw_env.files import require_ending, written_whole
+from lean_yaw_env.files import require_ending
 from lean_yaw_env.parameters import Foot, Vector
+from lean_yaw_env.rendering.figures import ENDINGS, new_figure, save_figure
 from lean_yaw_env.rendering.footprints import footprint_length, footprint_outlines
-from lean_yaw_env.rendering.optional import require_matplotlib
 from lean_yaw_env.rendering.palette import FOOT_COLOURS, INK, STRONG_GRID, unit_colour
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-ENDINGS = (".png", ".svg", ".pdf")
-_DPI = 150
 _MARGIN = 0.8  # leg lengths around the footprints
 
 
@@ -84,7 +82,7 @@ def save_footprints(
     gymnasium.error.DependencyNotInstalled
         If matplotlib is not installed.
     """
-    place = require_ending(path, ENDINGS)
+    require_ending(path, ENDINGS)
     if not walks:
         raise ValueError("walks must hold one walk or more, not none")
     low, high = _extent(walks)
@@ -94,19 +92,7 @@ def save_footprints(
     figure = new_figure(width * len(walks) + 0.9, width * shape + 1.1)
     axes = figure.subplots(1, len(walks), sharex=True, sharey=True, squeeze=False)
     draw_footprints(walks, list(axes[0]), foot_radius=foot_radius)
-    with written_whole(place) as temporary:
-        figure.savefig(temporary, dpi=_DPI)
-
-
-def new_figure(width: float, height: float) -> Any:
-    """A matplotlib figure, in inches, that needs no display and leaves no global state."""
-    require_matplotlib()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
+    save_figure(figure, path)
 
 
 def _extent(walks: Mapping[str, WalkRecord]) -> tuple[Vector, Vector]:

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lean_yaw_env.parameters import require_number
 from lean_yaw_env.rendering.body_views import draw_rear_view, draw_side_view
 from lean_yaw_env.rendering.camera import Panel
 from lean_yaw_env.rendering.canvas import Canvas
@@ -16,6 +15,7 @@ from lean_yaw_env.rendering.optional import require_pygame
 from lean_yaw_env.rendering.palette import BACKGROUND
 from lean_yaw_env.rendering.scene import Scene
 from lean_yaw_env.rendering.top_view import draw_top_view
+from lean_yaw_env.validation import require_count, require_number
 
 SIZE = (960, 540)
 """Width and height of a picture, pixels."""
@@ -126,10 +126,8 @@ def _require_size(size: tuple[int, int]) -> tuple[int, int]:
     try:
         width, height = size
     except (TypeError, ValueError) as error:
-        raise ValueError(f"size must be (width, height) in pixels, not {size!r}") from error
-    for name, value, low, high in zip(
-        ("width", "height"), (width, height), LEAST_SIZE, GREATEST_SIZE, strict=True
-    ):
-        if int(require_number(f"size: {name}", value, low, high)) != value:
-            raise ValueError(f"size: {name} must be a whole number of pixels, not {value!r}")
-    return int(width), int(height)
+        raise ValueError(f"size must be (width, height) in pixels, got {size!r}") from error
+    return (
+        require_count("size: width", width, LEAST_SIZE[0], GREATEST_SIZE[0]),
+        require_count("size: height", height, LEAST_SIZE[1], GREATEST_SIZE[1]),
+    )
