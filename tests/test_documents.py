@@ -86,7 +86,7 @@ def test_the_page_of_the_model_states_the_thresholds_of_the_code() -> None:
     assert LEAST_INDEPENDENCE == 1e-3
     assert r"\le 10^{-3} M_{11} M_{22}" in text
     assert (
-        f"within {LANDING_WINDOW:g} units of time ({SHIFTING_LANDING_WINDOW:g} while the masses move)"
+        f"within {LANDING_WINDOW:g} units of time ({SHIFTING_LANDING_WINDOW:g} while the masses move"
         in text
     )
 
