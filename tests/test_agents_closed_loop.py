@@ -109,7 +109,7 @@ def test_the_walker_that_is_not_acted_on_keeps_the_eigenvalues_of_its_own_gait(t
     assert np.allclose(gait.state[:5], cycle.state, atol=1e-9)
     # what is left of the offset and of the footprint before is gone after a stride
     assert sum(abs(value) < 1e-6 for value in own_eigenvalues(gait)) == 3
-    for name in ("speed", "step_length", "friction_demand", "normal_force", "gravity_work"):
+    for name in ("speed", "step_length", "greatest_friction", "least_normal_force", "gravity_work"):
         assert getattr(gait.cycle, name) == pytest.approx(getattr(cycle, name), abs=1e-9)
 
 

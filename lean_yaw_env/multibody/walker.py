@@ -209,8 +209,8 @@ def _inter_leg_rate(state: tuple[float, ...], is_held: bool, swing_rate: float |
 
 def _extremes(forces: tuple[ContactForces, ...]) -> ForceExtremes:
     return ForceExtremes(
-        least_normal=min(force.normal for force in forces),
-        greatest_friction_demand=max(force.friction_demand for force in forces),
+        least_normal_force=min(force.normal for force in forces),
+        greatest_friction=max(force.friction_demand for force in forces),
         greatest_yaw_torque=max(abs(force.yaw_torque) for force in forces),
         greatest_hip_torque=max(abs(force.hip_torque) for force in forces),
     )
