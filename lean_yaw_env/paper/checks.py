@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from lean_yaw_env.paper.numbers import PaperNumber, Statement
+from lean_yaw_env.paper.printed import PaperNumber, Statement
 
 Verdict = Literal["agrees", "agrees within rounding", "differs", "open"]
 VERDICTS: tuple[Verdict, ...] = ("agrees", "agrees within rounding", "differs", "open")
 """What a check can come to.
 
-``agrees``: the statement holds, or the number is within what the paper's "about" is taken to allow.
+``agrees``: the statement holds, or the number is within a tolerance that is named with its reason.
 ``agrees within rounding``: ours, rounded to the printed digits, is the printed number.
 ``differs``: it is not, and the remark says why, or what both are. ``open``: it is not, and nobody
 knows why.
@@ -37,6 +37,8 @@ class Check:
         As printed; ours with more digits.
     difference : float or None
         Ours less the paper's, where both are numbers.
+    allowed : str
+        What agrees: the tolerance with its reason, or the criterion.
     verdict : Verdict
     remark : str
         A plain sentence; never empty where the two disagree.
@@ -48,6 +50,7 @@ class Check:
     paper: str
     ours: str
     difference: float | None
+    allowed: str
     verdict: Verdict
     remark: str = ""
 
@@ -81,15 +84,13 @@ def compare(
         Whether a disagreement is unexplained.
     """
     difference = ours - number.value
-    if abs(difference) <= number.half_digit * (1.0 + _ROUND_OFF):
-        verdict: Verdict = "agrees within rounding"
-    elif number.about and abs(difference) <= number.about * abs(number.value):
-        verdict = "agrees"
+    if abs(difference) <= number.room * (1.0 + _ROUND_OFF) + _ROUND_OFF**2:
+        verdict: Verdict = "agrees"
+        if number.room <= number.half_digit:
+            verdict = "agrees within rounding"
     else:
         verdict = "open" if is_open else "differs"
     sentences = [remark] if remark else []
-    if verdict == "agrees":
-        sentences.append(f"The paper's number is approximate; {number.about:.0%} is allowed here.")
     if verdict in ("differs", "open"):
         sentences.append(unless or f"The paper has {number.printed}, we find {ours:.5g}.")
     return Check(
@@ -99,6 +100,7 @@ def compare(
         paper=number.printed,
         ours="none found" if math.isnan(ours) else significant(ours, number),
         difference=None if math.isnan(ours) else difference,
+        allowed=number.allowed,
         verdict=verdict,
         remark=" ".join(sentences),
     )
@@ -116,7 +118,7 @@ def judge(
     ours : str
         What we find, with its numbers.
     remark : str
-        Needed where it does not hold.
+        Said in any case; needed where it does not hold.
     is_open : bool
         Whether a disagreement is unexplained.
     """
@@ -127,6 +129,7 @@ def judge(
         paper=statement.printed,
         ours=ours,
         difference=None,
+        allowed=statement.criterion,
         verdict="agrees" if holds else "open" if is_open else "differs",
         remark=remark,
     )

@@ -1,15 +1,17 @@
-"""Every piece of the paper that can be reproduced, in the paper's order."""
+"""Every piece that can be reproduced: the paper's in its order, then those of other publications."""
 
 from __future__ import annotations
 
 from functools import partial
 
-from lean_yaw_env.paper.active_claims import active_claims, skateboard_claims, steering_claims
+from lean_yaw_env.paper.active_claims import active_claims
 from lean_yaw_env.paper.active_figures import figure_10, figure_11
 from lean_yaw_env.paper.bicycle_figure import figure_4
 from lean_yaw_env.paper.passive_claims import passive_claims
 from lean_yaw_env.paper.passive_figures import figure_7, figure_8
-from lean_yaw_env.paper.results import Piece, Result
+from lean_yaw_env.paper.results import CLASSICS, PAPER, Piece, Result
+from lean_yaw_env.paper.skateboard_claims import skateboard_claims
+from lean_yaw_env.paper.steering_claims import steering_claims
 from lean_yaw_env.paper.surface_figures import figure_9, figure_12
 from lean_yaw_env.paper.tables import table_1, table_2, table_3
 from lean_yaw_env.paper.velocity_figure import figure_13
@@ -18,6 +20,8 @@ from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.rendering import draw_walker
 
 ALL = "all"
+GROUPS = {ALL: PAPER, CLASSICS: CLASSICS}
+"""Names that stand for every piece of a group."""
 
 
 def walker_drawing() -> Result:
@@ -54,7 +58,9 @@ NAMES = tuple(piece.name for piece in PIECES)
 
 
 def pieces_named(names: tuple[str, ...] | list[str]) -> tuple[Piece, ...]:
-    """Pieces by their names, in the paper's order, each once; ``all`` names every one.
+    """Pieces by their names, in the order of ``PIECES``, each once.
+
+    ``all`` names every piece of the paper, ``classics`` every piece of other publications.
 
     Raises
     ------
@@ -62,10 +68,11 @@ def pieces_named(names: tuple[str, ...] | list[str]) -> tuple[Piece, ...]:
         If there is no piece of a name, or no name.
     """
     if not names:
-        raise ValueError(f"name at least one of {ALL}, {', '.join(NAMES)}")
+        raise ValueError(f"name at least one of {', '.join((*GROUPS, *NAMES))}")
     for name in names:
-        if name != ALL and name not in NAMES:
+        if name not in GROUPS and name not in NAMES:
             raise ValueError(
-                f"nothing is called {name!r}: name {ALL} or some of {', '.join(NAMES)}"
+                f"nothing is called {name!r}: name {ALL}, {CLASSICS} or some of {', '.join(NAMES)}"
             )
-    return tuple(piece for piece in PIECES if ALL in names or piece.name in names)
+    wanted = {GROUPS[name] for name in names if name in GROUPS}
+    return tuple(piece for piece in PIECES if piece.group in wanted or piece.name in names)

@@ -22,6 +22,7 @@ CHECK_COLUMNS = (
     "paper",
     "ours",
     "difference",
+    "allowed",
     "verdict",
     "remark",
 )

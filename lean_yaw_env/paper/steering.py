@@ -8,7 +8,7 @@ import numpy as np
 
 from lean_yaw_env.analysis import LimitCycle, find_limit_cycle
 from lean_yaw_env.paper import numbers
-from lean_yaw_env.parameters import WalkerParameters
+from lean_yaw_env.parameters import Vector, WalkerParameters
 from lean_yaw_env.walker import Walk, Walker
 
 
@@ -33,12 +33,19 @@ def turned(walk: Walk) -> float:
     return math.degrees(float(np.abs(walk.headings - walk.headings[0]).max()))
 
 
-def turning_radius(walk: Walk) -> float:
-    """Length walked per angle turned over the first right angle of a turn, leg lengths."""
-    strides = np.linalg.norm(walk.footprints[2::2] - walk.footprints[:-2:2], axis=1)
-    angles = np.abs(walk.headings[2::2] - walk.headings[0])
-    quarter = int(np.searchsorted(angles, 0.5 * math.pi))
-    return float(strides[: quarter + 1].sum() / angles[min(quarter, angles.size - 1)])
+def circle_through(points: Vector) -> tuple[float, float]:
+    """Radius of the circle that fits points, shape (n, 2), best, and the farthest point's distance from it."""
+    matrix = np.column_stack([2.0 * points, np.ones(len(points))])
+    x, y, constant = np.linalg.lstsq(matrix, (points**2).sum(axis=1), rcond=None)[0]
+    radius = math.sqrt(constant + x * x + y * y)
+    distances = np.hypot(points[:, 0] - x, points[:, 1] - y)
+    return radius, float(np.abs(distances - radius).max())
+
+
+def first_right_angle(walk: Walk, samples: int) -> Vector:
+    """The centre of mass's path, (downhill, right), until the heading has turned by 90°."""
+    quarter = int(np.argmax(np.abs(walk.headings - walk.headings[0]) >= 0.5 * math.pi))
+    return walk.path[: quarter * samples, [1, 3]]
 
 
 def circling_walker() -> Walker:
@@ -51,6 +58,11 @@ def circling_gait() -> LimitCycle:
     return find_limit_cycle(circling_walker(), mass_offset=numbers.LARGE_OFFSET)
 
 
-def circling_radius(gait: LimitCycle) -> float:
-    """Radius of the circle on which one foot's prints lie: a chord for each stride."""
-    return gait.step_length / abs(math.sin(0.5 * gait.turn))
+def circling_radius() -> float:
+    """Radius on which the centre of mass walks with the large offset, on a slope that turns along."""
+    gait = circling_gait()
+    steps = 2 * math.ceil(2.0 * math.pi / abs(gait.turn))
+    walk = circling_walker().walk(
+        steps, state=gait.state, mass_offset=numbers.LARGE_OFFSET, samples_per_step=10
+    )
+    return circle_through(walk.path[:, [1, 3]])[0]
