@@ -85,9 +85,7 @@ def compare(
     """
     difference = ours - number.value
     if abs(difference) <= number.room * (1.0 + _ROUND_OFF) + _ROUND_OFF**2:
-        verdict: Verdict = "agrees"
-        if number.room <= number.half_digit:
-            verdict = "agrees within rounding"
+        verdict: Verdict = "agrees within rounding" if number.tolerance is None else "agrees"
     else:
         verdict = "open" if is_open else "differs"
     sentences = [remark] if remark else []

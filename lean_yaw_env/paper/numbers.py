@@ -316,8 +316,8 @@ SPEED_IS_LINEAR = Statement(
     "linear",
     "almost linear",
     "section 4.3",
-    "distance of the four data points from the straight line through them",
-    "at most 0.01, the last printed digit of the speeds",
+    "share of the four speeds' variance that a straight line explains",
+    "at least 99 %",
 )
 TILT_INDEPENDENT = Statement(
     "velocity and tilt",

@@ -44,14 +44,9 @@ class PaperNumber:
         return len(self.printed.partition(".")[2])
 
     @property
-    def half_digit(self) -> float:
-        """Half a unit of the last printed place: what rounding may hide."""
-        return 0.5 * 10.0**-self.decimals
-
-    @property
     def room(self) -> float:
         """Greatest difference that agrees."""
-        return self.half_digit if self.tolerance is None else self.tolerance
+        return 0.5 * 10.0**-self.decimals if self.tolerance is None else self.tolerance
 
     @property
     def allowed(self) -> str:

@@ -10,10 +10,10 @@ from lean_yaw_env.paper.bicycle_figure import figure_4
 from lean_yaw_env.paper.passive_claims import passive_claims
 from lean_yaw_env.paper.passive_figures import figure_7, figure_8
 from lean_yaw_env.paper.results import CLASSICS, PAPER, Piece, Result
-from lean_yaw_env.paper.skateboard_claims import skateboard_claims
 from lean_yaw_env.paper.steering_claims import steering_claims
 from lean_yaw_env.paper.surface_figures import figure_9, figure_12
 from lean_yaw_env.paper.tables import table_1, table_2, table_3
+from lean_yaw_env.paper.vehicle_drawings import figure_3, skateboard_figures
 from lean_yaw_env.paper.velocity_figure import figure_13
 from lean_yaw_env.paper.walking_figures import figure_14, figure_15
 from lean_yaw_env.parameters import WalkerParameters
@@ -25,7 +25,7 @@ GROUPS = {ALL: PAPER, CLASSICS: CLASSICS}
 
 
 def walker_drawing() -> Result:
-    """The walker with its parameters; Figures 1 to 3, 5 and 6 are geometry."""
+    """The walker with its parameters; Figures 5 and 6 are geometry."""
     return Result(
         picture=partial(draw_walker, WalkerParameters()),
         caption="The walker and its parameters, in place of Figures 5 and 6.",
@@ -33,7 +33,8 @@ def walker_drawing() -> Result:
 
 
 PIECES: tuple[Piece, ...] = (
-    Piece("skateboard", "Skateboard, eqs. (1) to (3)", skateboard_claims),
+    Piece("skateboard", "Skateboard, eqs. (1) to (3), Figures 1 and 2", skateboard_figures),
+    Piece("figure3", "The bicycle (Figure 3)", figure_3),
     Piece("figure4", "Figure 4: the bicycle's eigenvalues", figure_4),
     Piece("walker", "The walker (Figures 5 and 6)", walker_drawing),
     Piece("table1", "Table 1: default parameters", table_1),

@@ -9,7 +9,6 @@ import numpy as np
 
 from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import Check, judge
-from lean_yaw_env.paper.results import Result
 from lean_yaw_env.vehicles import Skateboard
 
 _TILTS = (0.3, 0.6, 0.9, 1.2)
@@ -34,10 +33,10 @@ def turning_circle(board: Skateboard, lean: float) -> float:
     return 0.5 * board.wheelbase / math.tan(steer)
 
 
-def skateboard_claims() -> Result:
+def skateboard_checks() -> tuple[Check, ...]:
     """Eqs. (1) to (3) and the statements."""
     board = Skateboard()
-    return Result((*_equation_checks(board), *_statement_checks(board)))
+    return (*_equation_checks(board), *_statement_checks(board))
 
 
 def _equation_checks(board: Skateboard) -> tuple[Check, ...]:
