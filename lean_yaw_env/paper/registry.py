@@ -6,13 +6,18 @@ from functools import partial
 
 from lean_yaw_env.paper.active_claims import active_claims
 from lean_yaw_env.paper.active_figures import figure_10, figure_11
+from lean_yaw_env.paper.bicycle_benchmark import bicycle_benchmark
 from lean_yaw_env.paper.bicycle_figure import figure_4
 from lean_yaw_env.paper.passive_claims import passive_claims
 from lean_yaw_env.paper.passive_figures import figure_7, figure_8
 from lean_yaw_env.paper.results import CLASSICS, PAPER, Piece, Result
+from lean_yaw_env.paper.rolling_wheels import rolling_wheels
+from lean_yaw_env.paper.simplest_walker import simplest_walker
 from lean_yaw_env.paper.steering_claims import steering_claims
+from lean_yaw_env.paper.steering_robots import steering_robots
 from lean_yaw_env.paper.surface_figures import figure_9, figure_12
 from lean_yaw_env.paper.tables import table_1, table_2, table_3
+from lean_yaw_env.paper.uneven_ground import uneven_ground
 from lean_yaw_env.paper.vehicle_drawings import figure_3, skateboard_figures
 from lean_yaw_env.paper.velocity_figure import figure_13
 from lean_yaw_env.paper.walking_figures import figure_14, figure_15
@@ -54,6 +59,31 @@ PIECES: tuple[Piece, ...] = (
     Piece("figure14", "Figure 14: steady walk", figure_14),
     Piece("figure15", "Figure 15: steering", figure_15),
     Piece("claims-steering", "Circles and disturbances (section 4.4)", steering_claims),
+    Piece(
+        "simplest-walker",
+        "The simplest walking model: Garcia et al. 1998, Bhounsule 2014",
+        simplest_walker,
+        CLASSICS,
+    ),
+    Piece(
+        "rolling-wheels",
+        "Rimless, round and synthetic wheels (McGeer 1990), rocking sideways (Kuo 1999)",
+        rolling_wheels,
+        CLASSICS,
+    ),
+    Piece(
+        "uneven-ground",
+        "On uneven ground: Hobbelen and Wisse 2007, Byl and Tedrake 2009",
+        uneven_ground,
+        CLASSICS,
+    ),
+    Piece(
+        "bicycle-benchmark",
+        "The benchmark bicycle: Meijaard et al. 2007, BicycleParameters",
+        bicycle_benchmark,
+        CLASSICS,
+    ),
+    Piece("steering-robots", "Steering walkers built since", steering_robots, CLASSICS),
 )
 NAMES = tuple(piece.name for piece in PIECES)
 
