@@ -1,4 +1,4 @@
-"""Agents by name, made for a task: the one place where a new one is registered."""
+"""Agents by name, made for a task: the one place where a new one is registered, with the colour that it has in every picture."""
 
 from __future__ import annotations
 
@@ -7,13 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from agents.agent import Agent
-from agents.controllers.guidance import guided
-from agents.controllers.heading_feedback import HeadingFeedback
-from agents.controllers.mpc import MpcController
-from agents.controllers.simple import FixedController, RandomController
-from agents.files import read_json
-from agents.policies.storage import (
+from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.errors import NoGaitError
+from lean_yaw_env.files import read_json
+from lean_yaw_env.registration import ENV_IDS, GOAL_ENV_ID, TASK_VERSIONS
+from lean_yaw_env.rendering import palette
+from lean_yaw_env.validation import require_choice
+
+from .agent import Agent
+from .controllers.guidance import guided
+from .controllers.mpc import MpcController
+from .controllers.simple import FixedController, HeadingFeedback, RandomController
+from .policies.storage import (
     CARD_FILE,
     DEFAULT_ALGORITHM,
     load,
@@ -21,9 +26,6 @@ from agents.policies.storage import (
     shipped_seeds,
     task_of,
 )
-from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.errors import NoGaitError
-from lean_yaw_env.registration import ENV_IDS, TASK_VERSIONS
 
 Kind = Literal["baseline", "feedback", "planner", "learned"]
 """What an agent rests on: nothing, a law from its observation, a search on the walker itself at every step, or a training."""
@@ -60,11 +62,13 @@ class AgentEntry:
     ----------
     kind : Kind
     make : makes it for a request
+    colour : its own in every picture
     tasks : names of those that it is for
     """
 
     kind: Kind
     make: Callable[[AgentRequest], Agent]
+    colour: palette.Colour
     tasks: tuple[str, ...] = tuple(TASK_VERSIONS)
 
 
@@ -88,23 +92,26 @@ def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
 
 
 AGENTS: dict[str, AgentEntry] = {
-    "random": AgentEntry("baseline", lambda request: RandomController(request.seed)),
-    "fixed": AgentEntry("baseline", lambda request: FixedController()),
-    "feedback": AgentEntry("feedback", _feedback, ("Heading", "SpeedHeading", "UTurn", "Level")),
-    "lqr": AgentEntry("feedback", lambda request: guided(task_of(request.env_id), request.options)),
-    "mpc": AgentEntry("planner", _mpc),
-    "ppo": AgentEntry("learned", _trained("ppo")),
-    "sac": AgentEntry("learned", _trained("sac")),
-    "apg": AgentEntry("learned", _trained("apg")),
-}
+    "random": AgentEntry("baseline", lambda request: RandomController(request.seed), palette.GREY),
+    "fixed": AgentEntry("baseline", lambda request: FixedController(), palette.INK),
+    "feedback": AgentEntry("feedback", _feedback, palette.SKY_BLUE, ("Heading", "SpeedHeading", "UTurn", "Level")),
+    "lqr": AgentEntry("feedback", lambda request: guided(task_of(request.env_id), request.options), palette.BLUE),
+    "mpc": AgentEntry("planner", _mpc, palette.BLUISH_GREEN),
+    "ppo": AgentEntry("learned", _trained("ppo"), palette.VERMILLION),
+    "sac": AgentEntry("learned", _trained("sac"), palette.ORANGE),
+    "apg": AgentEntry("learned", _trained("apg"), palette.REDDISH_PURPLE),
+}  # fmt: skip
 """Every agent, in the order of tables; a learned one has the name of its algorithm."""
 
 
 def agent_entry(name: str) -> AgentEntry:
     """The entry of that name, or ``ValueError`` naming those there are."""
-    if name not in AGENTS:
-        raise ValueError(f"agents must be among {', '.join(AGENTS)}, not {name!r}")
-    return AGENTS[name]
+    return AGENTS[require_choice("agent", name, AGENTS)]
+
+
+def agent_colour(name: str) -> tuple[float, float, float]:
+    """An agent's colour in parts of one, the same in every picture; that of ink for one that is not in the registry."""
+    return palette.unit_colour(AGENTS[name].colour if name in AGENTS else palette.INK)
 
 
 def make_agent(name: str, request: AgentRequest) -> Agent:
@@ -122,7 +129,7 @@ def make_agent(name: str, request: AgentRequest) -> Agent:
     entry = agent_entry(name)
     task = task_of(request.env_id)
     if task not in entry.tasks:
-        raise ValueError(f"{name} is an agent for {', '.join(entry.tasks)}, not for {task!r}")
+        raise ValueError(f"{name} is an agent for {', '.join(entry.tasks)}, got {task!r}")
     return entry.make(request)
 
 
@@ -165,11 +172,13 @@ def policy_folders(algorithm: str, request: AgentRequest) -> list[Path]:
 
 def env_id_of(task: str) -> str:
     """The environment's id for a task's name, or ``ValueError``."""
-    for env_id in ENV_IDS:
-        if task_of(env_id) == task:
-            return env_id
-    names = ", ".join(task_of(env_id) for env_id in ENV_IDS)
-    raise ValueError(f"task must be one of {names}, not {task!r}")
+    if task == task_of(GOAL_ENV_ID):
+        raise ValueError(
+            f"task must be one whose observations are arrays, got {task!r}: its observations are dictionaries for goal-conditioned learners, "
+            f"as Stable-Baselines3's SAC with HerReplayBuffer on gym.make({GOAL_ENV_ID!r}); Waypoint is the same task for agents of this package"
+        )
+    require_choice("task", task, TASK_VERSIONS)
+    return next(env_id for env_id in ENV_IDS if task_of(env_id) == task)
 
 
 def newest_policy(env_id: str, runs: Path, algorithm: str = DEFAULT_ALGORITHM) -> Path | None:

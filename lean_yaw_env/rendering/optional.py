@@ -1,4 +1,4 @@
-"""Libraries that only drawing needs, with a word on how to install them."""
+"""Libraries that only some parts of the package need, with a word on how to install them."""
 
 from __future__ import annotations
 
@@ -10,33 +10,34 @@ from gymnasium.error import DependencyNotInstalled
 
 def require_pygame() -> Any:
     """Import pygame, or raise ``DependencyNotInstalled``."""
-    return _require("pygame", "pygame")
+    return require_module("pygame", "pygame")
 
 
 def require_matplotlib() -> Any:
     """Import matplotlib, or raise ``DependencyNotInstalled``."""
-    return _require("matplotlib", "matplotlib")
+    return require_module("matplotlib", "matplotlib")
 
 
 def require_ffmpeg() -> Any:
     """Import imageio_ffmpeg, or raise ``DependencyNotInstalled``."""
-    return _require("imageio_ffmpeg", "imageio-ffmpeg, which writes .mp4 files,")
+    return require_module("imageio_ffmpeg", "imageio-ffmpeg, which writes .mp4 files,")
 
 
 def require_pillow() -> Any:
     """Import PIL.Image, or raise ``DependencyNotInstalled``."""
-    return _require("PIL.Image", "pillow, which writes .gif files,")
+    return require_module("PIL.Image", "pillow, which writes .gif files,")
 
 
 def require_tqdm() -> Any:
     """Import tqdm, or raise ``DependencyNotInstalled``."""
-    return _require("tqdm", "tqdm, which shows progress,")
+    return require_module("tqdm", "tqdm, which shows progress,")
 
 
-def _require(module: str, name: str) -> Any:
+def require_module(module: str, name: str, extra: str = "render") -> Any:
+    """Import a module, or raise ``DependencyNotInstalled`` that says which extra of the package to install."""
     try:
         return importlib.import_module(module)
     except ImportError as error:
         raise DependencyNotInstalled(
-            f"{name} is not installed, run `pip install 'lean-yaw-env[render]'`"
+            f"{name} is not installed, run `pip install 'lean-yaw-env[{extra}]'`"
         ) from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ENDINGS = (".png", ".svg", ".pdf")
-_DPI = 150
+DPI = 150
 _MARGIN = 0.8  # leg lengths around the footprints
 
 
@@ -94,8 +95,14 @@ def save_footprints(
     figure = new_figure(width * len(walks) + 0.9, width * shape + 1.1)
     axes = figure.subplots(1, len(walks), sharex=True, sharey=True, squeeze=False)
     draw_footprints(walks, list(axes[0]), foot_radius=foot_radius)
-    with written_whole(place) as temporary:
-        figure.savefig(temporary, dpi=_DPI)
+    save_figure(figure, place)
+
+
+def save_figure(figure: Any, path: Path, *, dpi: int = DPI) -> None:
+    """Write a figure to a file, whole or not at all."""
+    figure.draw_without_rendering()  # panels of a fixed shape are laid out right at the second time only
+    with written_whole(path) as temporary:
+        figure.savefig(temporary, dpi=dpi)
 
 
 def new_figure(width: float, height: float) -> Any:
