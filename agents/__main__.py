@@ -1,10 +1,14 @@
-"""``python -m agents``."""
+"""``python -m agents``; needs the libraries of ``lean-yaw-env[train]``."""
 
-from lean_yaw_env.rendering.optional import require_module
+import sys
 
-require_module("typer", "typer, which the command line needs,", "train")
-
-from .command_line import app  # noqa: E402
+from lean_yaw_env.extras import MissingLibraryError, needs_extra
 
 if __name__ == "__main__":
-    app(prog_name="python -m agents")
+    try:
+        with needs_extra("train"):
+            from .command_line import app
+
+            app(prog_name=f"python -m {__package__}")
+    except MissingLibraryError as error:
+        sys.exit(f"{__package__}: {error}")

@@ -1,4 +1,4 @@
-"""Agents by name, made for a task: the one place where a new one is registered, with the colour that it has in every picture."""
+"""Agents by name, made for a task: the one place where a new one is registered."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.files import read_json
 from lean_yaw_env.registration import ENV_IDS, GOAL_ENV_ID, TASK_VERSIONS
-from lean_yaw_env.rendering import palette
+from lean_yaw_env.rendering.palette import AGENT_COLOURS, INK, unit_colour
 from lean_yaw_env.validation import require_choice
 
 from .agent import Agent
@@ -62,13 +62,11 @@ class AgentEntry:
     ----------
     kind : Kind
     make : makes it for a request
-    colour : its own in every picture
     tasks : names of those that it is for
     """
 
     kind: Kind
     make: Callable[[AgentRequest], Agent]
-    colour: palette.Colour
     tasks: tuple[str, ...] = tuple(TASK_VERSIONS)
 
 
@@ -92,15 +90,15 @@ def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
 
 
 AGENTS: dict[str, AgentEntry] = {
-    "random": AgentEntry("baseline", lambda request: RandomController(request.seed), palette.GREY),
-    "fixed": AgentEntry("baseline", lambda request: FixedController(), palette.INK),
-    "feedback": AgentEntry("feedback", _feedback, palette.SKY_BLUE, ("Heading", "SpeedHeading", "UTurn", "Level")),
-    "lqr": AgentEntry("feedback", lambda request: guided(task_of(request.env_id), request.options), palette.BLUE),
-    "mpc": AgentEntry("planner", _mpc, palette.BLUISH_GREEN),
-    "ppo": AgentEntry("learned", _trained("ppo"), palette.VERMILLION),
-    "sac": AgentEntry("learned", _trained("sac"), palette.ORANGE),
-    "apg": AgentEntry("learned", _trained("apg"), palette.REDDISH_PURPLE),
-}  # fmt: skip
+    "random": AgentEntry("baseline", lambda request: RandomController(request.seed)),
+    "fixed": AgentEntry("baseline", lambda request: FixedController()),
+    "feedback": AgentEntry("feedback", _feedback, ("Heading", "SpeedHeading", "UTurn", "Level")),
+    "lqr": AgentEntry("feedback", lambda request: guided(task_of(request.env_id), request.options)),
+    "mpc": AgentEntry("planner", _mpc),
+    "ppo": AgentEntry("learned", _trained("ppo")),
+    "sac": AgentEntry("learned", _trained("sac")),
+    "apg": AgentEntry("learned", _trained("apg")),
+}
 """Every agent, in the order of tables; a learned one has the name of its algorithm."""
 
 
@@ -110,8 +108,8 @@ def agent_entry(name: str) -> AgentEntry:
 
 
 def agent_colour(name: str) -> tuple[float, float, float]:
-    """An agent's colour in parts of one, the same in every picture; that of ink for one that is not in the registry."""
-    return palette.unit_colour(AGENTS[name].colour if name in AGENTS else palette.INK)
+    """An agent's colour in parts of one, the same in every picture; that of ink for one that has none."""
+    return unit_colour(AGENT_COLOURS.get(name, INK))
 
 
 def make_agent(name: str, request: AgentRequest) -> Agent:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from dataclasses import asdict
 from pathlib import Path
 
@@ -14,17 +12,9 @@ from benchmarks.compare import as_text as comparison_text
 from benchmarks.compare import compare
 from benchmarks.machine import machine
 from benchmarks.plot import save_plot
+from lean_yaw_env.files import write_text
 
 RESULTS = Path(__file__).parent / "results"
-
-
-def _write(text: str, path: Path) -> None:
-    """Write beside the file first: it is there whole or not at all."""
-    handle, name = tempfile.mkstemp(dir=path.parent, text=True)
-    with os.fdopen(handle, "w") as file:
-        file.write(text)
-    os.chmod(name, 0o644)  # a temporary file is its owner's alone
-    os.replace(name, path)
 
 
 def main() -> None:
@@ -38,7 +28,7 @@ def main() -> None:
     print(comparison_text(speeds))
     kept = as_json(figures) | {"comparison": [asdict(speed) for speed in speeds]}
     RESULTS.mkdir(exist_ok=True)
-    _write(json.dumps(kept, indent=2) + "\n", RESULTS / "full.json")
+    write_text(RESULTS / "full.json", json.dumps(kept, indent=2) + "\n")
     save_plot(speeds, machine(), RESULTS / "comparison.png")
 
 

@@ -7,13 +7,11 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
-from lean_yaw_env.files import written_whole
+from lean_yaw_env.rendering.figures import new_figure, save_figure
+from lean_yaw_env.rendering.palette import AGENT_COLOURS, unit_colour
 
-COLOURS = {"apg": "#1b6ca8", "ppo": "#c05a1d"}
 NAMES = {"apg": "gradient agent", "ppo": "PPO"}
 
 
@@ -34,16 +32,16 @@ def save_comparison(
     curves: Sequence[LearningCurve], task: str, machine: Mapping[str, Any], path: Path
 ) -> None:
     """Draw each training thin and the median of each algorithm's thick, on logarithmic axes of cost; the picture is written whole."""
-    figure = Figure(figsize=(10.0, 4.2), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(10.0, 4.2)
     panels = figure.subplots(1, 2, sharey=True)
     for axes, cost in zip(panels, ("steps", "seconds"), strict=True):
-        for algorithm, colour in COLOURS.items():
+        for algorithm, name in NAMES.items():
+            colour = unit_colour(AGENT_COLOURS[algorithm])
             own = [curve for curve in curves if curve.algorithm == algorithm]
             for curve in own:
                 axes.plot(getattr(curve, cost), curve.returns, color=colour, linewidth=0.7, alpha=0.5)  # fmt: skip
             if own:
-                label = f"{NAMES[algorithm]}, median of {len(own)}" if len(own) > 1 else f"{NAMES[algorithm]}, one training"  # fmt: skip
+                label = f"{name}, median of {len(own)}" if len(own) > 1 else f"{name}, one training"  # fmt: skip
                 axes.plot(*_median(own, cost), color=colour, linewidth=2.2, label=label)
         axes.set_xscale("log")
         axes.grid(color="0.9", which="both")
@@ -58,8 +56,7 @@ def save_comparison(
     figure.suptitle(
         f"{task}: score while training, without exploration ({machine['processor']})", fontsize=11
     )
-    with written_whole(path) as temporary:
-        figure.savefig(temporary, dpi=150)
+    save_figure(figure, path)
 
 
 def _median(curves: Sequence[LearningCurve], cost: str) -> tuple[Any, Any]:

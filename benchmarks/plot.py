@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from lean_yaw_env.rendering.figures import new_figure, save_figure
+from lean_yaw_env.rendering.palette import BLUE, LIGHT_GREY, unit_colour
 
-OWN, OTHER = "#1b6ca8", "#9a9a9a"
+OWN, OTHER = unit_colour(BLUE), unit_colour(LIGHT_GREY)
 
 
 class Bar(Protocol):
@@ -27,8 +25,7 @@ class Bar(Protocol):
 
 def save_plot(bars: Sequence[Bar], machine: Mapping[str, Any], path: Path) -> None:
     """Draw steps per second on a logarithmic axis, fastest on top, and write the picture whole."""
-    figure = Figure(figsize=(9.0, 0.36 * len(bars) + 1.5), layout="constrained")
-    canvas = FigureCanvasAgg(figure)
+    figure = new_figure(9.0, 0.36 * len(bars) + 1.5)
     axes = figure.add_subplot()
     places = range(len(bars))
     speeds = [bar.steps_per_second for bar in bars]
@@ -44,7 +41,7 @@ def save_plot(bars: Sequence[Bar], machine: Mapping[str, Any], path: Path) -> No
     axes.set_xlabel("steps per second; this package (blue): whole walking steps")
     axes.spines[["top", "right"]].set_visible(False)
     axes.set_title(_caption(machine), fontsize=9, loc="left", color="dimgray")
-    _write(canvas, path)
+    save_figure(figure, path, dpi=160)
 
 
 def _caption(machine: Mapping[str, Any]) -> str:
@@ -60,15 +57,3 @@ def _short(speed: float) -> str:
         if speed >= size:
             return f"{speed / size:.3g} {unit}"
     return f"{speed:.3g}"
-
-
-def _write(canvas: FigureCanvasAgg, path: Path) -> None:
-    """Write beside the file first: a picture is there whole or not at all."""
-    handle, name = tempfile.mkstemp(suffix=".png", dir=path.parent)
-    os.close(handle)
-    try:
-        canvas.figure.savefig(name, dpi=160)
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise

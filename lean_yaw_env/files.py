@@ -7,7 +7,7 @@ import glob
 import json
 import math
 import os
-import tempfile
+import secrets
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -33,14 +33,11 @@ def written_whole(path: Path) -> Iterator[Path]:
     What an earlier process left of the same file when it was killed is removed first.
     """
     remove_partial(path)
-    handle, name = tempfile.mkstemp(
-        prefix=f"{_PREFIX}{os.getpid()}-{path.stem}-", suffix=path.suffix, dir=path.parent
-    )
-    os.close(handle)
-    temporary = Path(name)
+    name = f"{_PREFIX}{os.getpid()}-{path.stem}-{secrets.token_hex(4)}{path.suffix}"
+    temporary = path.parent / name
+    temporary.touch(exist_ok=False)
     try:
         yield temporary
-        temporary.chmod(0o666 & ~_umask())  # mkstemp's files are for their owner alone
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
@@ -86,12 +83,6 @@ def is_running(process: int) -> bool:
     except PermissionError:  # another user's
         return True
     return True
-
-
-def _umask() -> int:
-    mask = os.umask(0)  # it can only be read by setting it
-    os.umask(mask)
-    return mask
 
 
 def _plain(value: Any) -> Any:

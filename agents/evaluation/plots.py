@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from lean_yaw_env.envs.tasks import task_named
-from lean_yaw_env.rendering.picture import new_figure, save_figure
+from lean_yaw_env.rendering.figures import new_figure, save_figure
 
 from ..registry import agent_colour
 from .comparison import direction

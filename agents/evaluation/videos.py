@@ -28,7 +28,6 @@ from lean_yaw_env.rendering.filming import (
     swing_angle,
 )
 from lean_yaw_env.rendering.geometry import Pose
-from lean_yaw_env.rendering.optional import require_pillow
 from lean_yaw_env.rendering.palette import ANKLE_AXIS, FAINT_INK, FLOOR, INK
 from lean_yaw_env.rendering.pygame_renderer import Renderer
 from lean_yaw_env.rendering.scene import Scene
@@ -287,10 +286,9 @@ def draw_push(frame: Frame, push: tuple[float, float] | None) -> Frame:
     """
     if push is None:
         return frame
-    image = require_pillow()
-    from PIL import ImageDraw
+    from PIL import Image, ImageDraw
 
-    picture = image.fromarray(frame)
+    picture = Image.fromarray(frame)
     draw = ImageDraw.Draw(picture)
     x, y = _DIAL_PLACE[0] * frame.shape[1], _DIAL_PLACE[1]
     draw.ellipse(

@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import EngFormatter
 
 from lean_yaw_env.parameters import Vector
-from lean_yaw_env.rendering.palette import GREY, VERMILLION, unit_colour
-from lean_yaw_env.rendering.picture import new_figure, save_figure
+from lean_yaw_env.rendering.figures import new_figure, save_figure
+from lean_yaw_env.rendering.palette import LIGHT_GREY, VERMILION, unit_colour
 
 from ..evaluation.results import RETURN, Row
 from ..registry import agent_colour
@@ -44,10 +44,10 @@ def save_learning_curve(
     """
     figure, axes = _new_axes()
     fell = ~log.survived
-    axes.plot(log.steps[~fell], log.returns[~fell], ".", color=unit_colour(GREY), alpha=0.5,
+    axes.plot(log.steps[~fell], log.returns[~fell], ".", color=unit_colour(LIGHT_GREY),
               markersize=3, label="an episode, survived")  # fmt: skip
     if fell.any():
-        axes.plot(log.steps[fell], log.returns[fell], "x", color=unit_colour(VERMILLION),
+        axes.plot(log.steps[fell], log.returns[fell], "x", color=unit_colour(VERMILION),
                   markersize=4, alpha=0.5, label="an episode, fell")  # fmt: skip
     if len(log.returns) >= WINDOW:
         mean = np.convolve(log.returns, np.full(WINDOW, 1.0 / WINDOW), "valid")

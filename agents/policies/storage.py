@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.files import read_json, write_json, written_whole
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.registration import ENV_IDS, NAMESPACE
-from lean_yaw_env.rendering.optional import require_module
 
 from ..observations import ObservationLayout
 from .policy import Policy, PolicyCard, require_algorithm
@@ -268,6 +268,7 @@ def _read_weights(path: Path, digest: str) -> dict[str, Any]:
 
 def _safetensors() -> Any:
     """The library, imported when a policy is read or written: other agents do without."""
-    name = "safetensors, which policies are kept in,"
-    require_module("safetensors.numpy", name, "agents")
-    return require_module("safetensors", name, "agents")
+    with needs_extra("agents"):
+        import safetensors
+        import safetensors.numpy
+    return safetensors

@@ -1,21 +1,10 @@
-"""Colours of pictures and films.
-
-Colours that must be told apart are those of Okabe and Ito (2008, "Color universal design"), which colour-blind readers tell apart too.
-"""
+"""Colours of pictures and films, chosen so that readers with any kind of colour blindness can tell them apart."""
 
 from __future__ import annotations
 
 from lean_yaw_env.parameters import Foot
 
 Colour = tuple[int, int, int]
-
-ORANGE: Colour = (230, 159, 0)
-SKY_BLUE: Colour = (86, 180, 233)
-BLUISH_GREEN: Colour = (0, 158, 115)
-BLUE: Colour = (0, 114, 178)
-VERMILLION: Colour = (213, 94, 0)
-REDDISH_PURPLE: Colour = (204, 121, 167)
-GREY: Colour = (150, 150, 150)
 
 BACKGROUND: Colour = (236, 234, 228)
 FLOOR: Colour = (250, 249, 246)
@@ -25,15 +14,39 @@ GRID: Colour = (232, 229, 222)
 STRONG_GRID: Colour = (214, 210, 200)
 INK: Colour = (43, 45, 52)
 FAINT_INK: Colour = (124, 125, 128)
-LEFT = BLUE
-RIGHT = VERMILLION
+LEFT: Colour = (37, 110, 178)
+RIGHT: Colour = (214, 104, 37)
 PATH: Colour = (92, 94, 102)
-COMMAND = BLUISH_GREEN
+COMMAND: Colour = (22, 142, 104)
 ANKLE_AXIS: Colour = (190, 38, 92)
-GOAL = ORANGE
-REFERENCE = REDDISH_PURPLE
+GOAL: Colour = (222, 168, 30)
+REFERENCE: Colour = (140, 110, 180)
 
 FOOT_COLOURS: dict[Foot, Colour] = {"left": LEFT, "right": RIGHT}
+
+# Okabe and Ito, "Color universal design" (2008), without yellow, which is too faint for a line on white
+BLACK: Colour = (0, 0, 0)
+ORANGE: Colour = (230, 159, 0)
+SKY_BLUE: Colour = (86, 180, 233)
+GREEN: Colour = (0, 158, 115)
+BLUE: Colour = (0, 114, 178)
+VERMILION: Colour = (213, 94, 0)
+PURPLE: Colour = (204, 121, 167)
+LIGHT_GREY: Colour = (192, 192, 192)
+
+AGENT_COLOURS: dict[str, Colour] = {
+    "random": LIGHT_GREY,
+    "fixed": BLACK,
+    "feedback": ORANGE,
+    "lqr": SKY_BLUE,
+    "mpc": GREEN,
+    "ppo": VERMILION,
+    "sac": PURPLE,
+    "apg": BLUE,
+}
+"""The colour of each agent, the same in every picture."""
+SERIES_COLOURS: tuple[Colour, ...] = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY_BLUE, BLACK)
+"""Of curves that are not agents, in this order; then another line style is needed."""
 
 
 def mixed(colour: Colour, other: Colour, share: float) -> Colour:
@@ -45,6 +58,6 @@ def mixed(colour: Colour, other: Colour, share: float) -> Colour:
 
 
 def unit_colour(colour: Colour) -> tuple[float, float, float]:
-    """The same colour in parts of one."""
+    """The same colour in parts of one, as matplotlib takes it."""
     red, green, blue = (value / 255.0 for value in colour)
     return red, green, blue
