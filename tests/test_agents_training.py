@@ -207,7 +207,7 @@ def test_finished_runs_are_shipped_and_loaded_by_id_and_others_are_refused(tmp_p
     with pytest.raises(ValueError, match=r"no policy can be loaded"):
         ship(folder)
     result = run(folder, progress=False)
-    shipped = ship(folder)
+    (shipped,) = ship(folder)
     assert shipped == tmp_path / "trained" / "Heading-v0" / "ppo" / "seed3"
     names = ["evaluation.json", "policy.json", "policy.safetensors"]
     assert sorted(path.name for path in shipped.iterdir()) == names
@@ -216,7 +216,7 @@ def test_finished_runs_are_shipped_and_loaded_by_id_and_others_are_refused(tmp_p
     assert rows == rows_to_plain([row for row in result.rows if row.agent == "ppo"])
     with pytest.raises(ValueError, match="replace it by --replace"):
         ship(folder)
-    assert ship(folder, replace=True) == shipped
+    assert ship(folder, replace=True) == [shipped]
     (folder / "evaluation.json").unlink()
     with pytest.raises(ValueError, match="is not finished"):
         ship(folder, replace=True)
