@@ -12,8 +12,7 @@ from agents.learning.algorithms import train
 from agents.learning.gradient.learner import GradientSettings
 from agents.learning.ppo import PPOSettings
 from agents.learning.recorder import read_checkpoint
-from benchmarks.gradient import Curve, policy_in, table
-from benchmarks.learning_plot import save_comparison
+from benchmarks.gradient import Curve, policy_in, save_comparison, table
 
 ID = "LeanYaw/Heading-v0"
 PPO = PPOSettings(steps=256, walkers=8, steps_per_update=16, batch_size=64, epochs=1, hidden=(8, 8))

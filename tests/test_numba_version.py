@@ -21,5 +21,7 @@ def test_another_version_is_refused_with_what_to_install() -> None:
     require_numba(low)
     require_numba((high[0], high[1] - 1))
     for version in ((low[0], low[1] - 1), high, (1, 0)):
-        with pytest.raises(ImportError, match=r"tested with numba>=0\.61,<0\.\d+; found .* run `pip"):
+        with pytest.raises(
+            ImportError, match=r"tested with numba>=0\.61,<0\.\d+; found .* run `pip"
+        ):
             require_numba(version)
