@@ -5,6 +5,8 @@ A step's numbers are written to a row for each walker, by code that is compiled 
 
 from __future__ import annotations
 
+import sys
+from collections import deque
 from enum import IntEnum
 from typing import Any, NamedTuple
 
@@ -57,6 +59,7 @@ FOOTPRINT_MEANING = (
 _ARRAYS = (*(f"walker.{field.name}" for field in STATE_FIELDS), "walker.place_x", "walker.place_z")
 _FOOTPRINT = slice(STATE_SIZE, STATE_SIZE + 2)
 _FIRST_NUMBER = STATE_SIZE + 2
+_MOST_PAGES = 3  # looked through: who keeps the infos of many steps gets new pages anyway
 
 COMMON_INFOS = (
     Info("stance_side", "walker.side", "+1 while the left foot stands, -1 the right"),
@@ -165,7 +168,6 @@ class InfoMaker:
             self._columns = slice(_FIRST_NUMBER, _FIRST_NUMBER + len(told))
         self._names = tuple(infos[k].key for k in told)
         self._masks = tuple(f"_{key}" for key in (*self._names, "state", "footprint", "fall"))
-        self._everyone: dict[int, dict[str, Any]] = {}
 
     def views(self, row: Vector) -> tuple[Vector, Vector, Vector]:
         """Of a walker's row: the numbers that are told one by one, the state, the footprint."""
@@ -181,20 +183,68 @@ class InfoMaker:
         return info
 
     def many(
-        self, table: Vector, falls: NDArray[np.int64], mask: Flags | None = None
+        self, table: Vector, falls: NDArray[np.int64], mask: Flags
     ) -> dict[str, Any]:
-        """The infos of a vector environment, views of its table (n, size), each key beside its mask; of all walkers without one."""
-        info = dict.fromkeys(self._masks, mask) if mask is not None else self._all(len(table)).copy()
+        """The infos of a vector environment, views of its table (n, size), each key beside its mask."""
+        info: dict[str, Any] = dict.fromkeys(self._masks, mask)
         info.update(zip(self._names, table.T[self._columns], strict=False))
         info["state"] = table[:, :STATE_SIZE]
         info["footprint"] = table[:, _FOOTPRINT]
-        info["fall"] = falls.copy() if mask is None else np.where(mask, falls, 0)
+        info["fall"] = falls
         return info
 
-    def _all(self, n: int) -> dict[str, Any]:
-        """The masks of infos of all of n walkers, which nobody may change."""
-        if n not in self._everyone:
-            mask = np.ones(n, dtype=np.bool_)
-            mask.flags.writeable = False
-            self._everyone[n] = dict.fromkeys(self._masks, mask)
-        return self._everyone[n]
+
+class InfoPage:
+    """A table of infos of all of n walkers, and the views of it that an ``info`` hands out: made once, used for step after step.
+
+    To make the views anew takes as long as stepping a dozen walkers. ``is_free`` tells whether the arrays of an earlier ``info`` are in nobody's
+    hands any more; a view of one of them, or a tensor that shares its memory, counts as well.
+    """
+
+    def __init__(self, maker: InfoMaker, n: int) -> None:
+        everyone = np.ones(n, dtype=np.bool_)
+        everyone.flags.writeable = False
+        self.table = np.empty((n, maker.size))
+        self._falls = np.zeros(n, dtype=np.int64)
+        self._info = maker.many(self.table, self._falls, everyone)
+        told = [array for key, array in self._info.items() if not key.startswith("_")]
+        self._arrays = [self.table, *told]
+        del told
+        self._references = self._count()
+
+    def is_free(self) -> bool:
+        """Whether nobody but this page holds its arrays."""
+        return self._count() == self._references
+
+    def info(self, falls: NDArray[np.int64]) -> dict[str, Any]:
+        """The ``info`` of the table as it is filled."""
+        self._falls[:] = falls
+        return self._info.copy()
+
+    def _count(self) -> int:
+        return sum(map(sys.getrefcount, self._arrays))
+
+
+class InfoPages:
+    """As many pages as are in use at a time.
+
+    Parameters
+    ----------
+    maker : InfoMaker
+    n : int
+        Walkers.
+    """
+
+    def __init__(self, maker: InfoMaker, n: int) -> None:
+        self._maker = maker
+        self._n = n
+        self._pages: deque[InfoPage] = deque(maxlen=_MOST_PAGES)
+
+    def take(self) -> InfoPage:
+        """A page to fill: one that is free again, or a new one."""
+        for page in self._pages:
+            if page.is_free():
+                return page
+        page = InfoPage(self._maker, self._n)
+        self._pages.append(page)
+        return page

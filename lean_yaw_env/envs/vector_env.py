@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from lean_yaw_env.envs.info import InfoPages
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, action_space
 from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.envs.snapshots import State, restore, state_of
@@ -94,6 +95,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         self._generators: list[np.random.Generator] | None = None
         self._ended = np.ones(self.num_envs, dtype=np.bool_)
         self._tells_ends = step_info
+        self._pages = InfoPages(self.simulation.info, self.num_envs)
 
     def reset(
         self,
@@ -129,7 +131,8 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
                 f"walkers {np.flatnonzero(self._ended).tolist()} have ended; reset them by options={{'reset_mask': ...}}"
             )
         simulation.actions[:] = self._require_actions(actions)
-        infos = simulation.new_infos() if self.step_info else None
+        page = self._pages.take() if self.step_info else None
+        infos = None if page is None else page.table
         simulation.renew_results()
         share_out(
             lambda first, last: simulation.step_many(self._ended, first, last, infos),
@@ -143,7 +146,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         final: dict[str, Any] = {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP and np.count_nonzero(self._ended):
             final = self._restart_in_same_step(infos)
-        info = self._told(infos, None)
+        info = {} if page is None else page.info(simulation.falls)
         return self._observations(), rewards, terminated, truncated, final | info
 
     def get_state(self) -> State:
@@ -249,6 +252,8 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
     def _observation(self, row: int) -> Any:
         return self.simulation.observations[row].copy()
 
-    def _told(self, infos: Vector | None, mask: NDArray[np.bool_] | None) -> dict[str, Any]:
-        simulation = self.simulation
-        return {} if infos is None else simulation.info.many(infos, simulation.falls, mask)
+    def _told(self, infos: Vector | None, mask: NDArray[np.bool_]) -> dict[str, Any]:
+        if infos is None:
+            return {}
+        falls = np.where(mask, self.simulation.falls, 0)
+        return self.simulation.info.many(infos, falls, mask)
