@@ -41,8 +41,8 @@ NUMBERS = (
     "speed",
     "step_length",
     "stride_period",
-    "normal_force",
-    "friction_demand",
+    "least_normal_force",
+    "greatest_friction",
     "gravity_work",
     "shift_work",
 )
@@ -276,8 +276,8 @@ class _ActiveSearch:
         values["speed"][some] = chord / duration
         values["step_length"][some] = 0.5 * chord
         values["stride_period"][some] = duration
-        values["normal_force"][some] = field["least_normal_force"].min(axis=1)
-        values["friction_demand"][some] = field["greatest_friction"].max(axis=1)
+        values["least_normal_force"][some] = field["least_normal_force"].min(axis=1)
+        values["greatest_friction"][some] = field["greatest_friction"].max(axis=1)
         values["gravity_work"][some] = field["gravity_work"].sum(axis=1) / chord
         values["shift_work"][some] = field["shift_work"].sum(axis=1) / chord
         matrices = gaits.strides[gaits.found]

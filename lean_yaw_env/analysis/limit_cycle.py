@@ -67,7 +67,7 @@ class LimitCycle:
     coordinates : names of the section's coordinates that the gait repeats
     gravity_work, shift_work : float
         Per distance, in weights: what gravity gives, and what moving the masses puts in.
-    normal_force, friction_demand : float
+    least_normal_force, greatest_friction : float
         Least normal force (in weights) and greatest tangential over normal force.
     """
 
@@ -83,8 +83,8 @@ class LimitCycle:
     coordinates: tuple[str, ...]
     gravity_work: float
     shift_work: float
-    normal_force: float
-    friction_demand: float
+    least_normal_force: float
+    greatest_friction: float
 
     @property
     def is_stable(self) -> bool:
@@ -222,8 +222,8 @@ def cycle_at(section_map: ActiveMap | PassiveMap, state: Vector) -> LimitCycle:
         coordinates=tuple(cycle.names[i] for i in free),
         gravity_work=gravity / chord,
         shift_work=shift / chord,
-        normal_force=min(result.normal_force for result in results),
-        friction_demand=max(result.friction_demand for result in results),
+        least_normal_force=min(result.least_normal_force for result in results),
+        greatest_friction=max(result.greatest_friction for result in results),
     )
 
 

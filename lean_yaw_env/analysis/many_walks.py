@@ -28,7 +28,7 @@ ENDINGS = {
 """What ``ManyWalks.endings`` holds. A passive state that no foot behind can stand in is a trip."""
 
 _STATUS = Outcome._fields.index("status")
-_OFFSET = Outcome._fields.index("offset")
+_OFFSET = Outcome._fields.index("mass_offset")
 _PASSIVE_STATUS = PassiveOutcome._fields.index("status")
 _PASSIVE_ANGLE = PassiveOutcome._fields.index("inter_leg_angle")
 

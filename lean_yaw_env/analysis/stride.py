@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lean_yaw_env.errors import FellError
-from lean_yaw_env.kernel.jacobian import INPUTS, step_jacobian
+from lean_yaw_env.kernel.jacobian import INPUTS, OUTPUTS, step_jacobian
 from lean_yaw_env.kernel.records import Command
 from lean_yaw_env.parameters import (
     INTER_LEG_ANGLE,
@@ -59,6 +59,8 @@ class Step:
     state : shape (5,)
     by_state : shape (5, 5)
     by_inter_leg_angle, by_mass_offset, by_previous_offset : shape (5,)
+    jacobian : shape (10, 8)
+        Of all ``kernel.jacobian.OUTPUTS``, the state's first, by state, inter-leg angle, mass offset and the offset before.
     """
 
     state: Vector
@@ -66,6 +68,7 @@ class Step:
     by_inter_leg_angle: Vector
     by_mass_offset: Vector
     by_previous_offset: Vector
+    jacobian: Vector
 
 
 def require_offsets(mass_offset: float | tuple[float, float]) -> tuple[float, float]:
@@ -94,7 +97,7 @@ def differentiate_step(walker: Walker, state: ArrayLike, stance: Foot, command: 
     """
     start = require_state(state)
     after = np.empty(STATE_SIZE)
-    jacobian = np.empty((STATE_SIZE, INPUTS))
+    jacobian = np.empty((len(OUTPUTS), INPUTS))
     status = step_jacobian(
         walker.parameters.body(), command, *start.tolist(), SIDE[stance], after, jacobian
     )
@@ -103,7 +106,8 @@ def differentiate_step(walker: Walker, state: ArrayLike, stance: Foot, command: 
         raise FellError(
             f"the walker fell {FALL_OF_STATUS[status].value} in the step on its {stance} foot"
         )
-    return Step(after, jacobian[:, :5], jacobian[:, 5], jacobian[:, 6], jacobian[:, 7])
+    of_state = jacobian[:STATE_SIZE]
+    return Step(after, of_state[:, :5], of_state[:, 5], of_state[:, 6], of_state[:, 7], jacobian)
 
 
 def stride_map(

@@ -34,8 +34,8 @@ def step_sensitivity(body, command, state, side, after, jacobian):
             ),
             Command(
                 command.inter_leg_angle + (seed if column == 5 else 0j),
-                command.offset + (seed if column == 6 else 0j),
-                command.offset_before + (seed if column == 7 else 0j),
+                command.mass_offset + (seed if column == 6 else 0j),
+                command.previous_offset + (seed if column == 7 else 0j),
             ),
             state[0] + (seed if column == 0 else 0j),
             state[1] + (seed if column == 1 else 0j),
