@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import glob
 import os
-import tempfile
+import secrets
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,17 +29,20 @@ def written_whole(path: Path) -> Iterator[Path]:
     What an earlier process left of the same file when it was killed is removed first.
     """
     remove_partial(path)
-    handle, name = tempfile.mkstemp(
-        prefix=f"{_PREFIX}{os.getpid()}-{path.stem}-", suffix=path.suffix, dir=path.parent
-    )
-    os.close(handle)
-    temporary = Path(name)
+    name = f"{_PREFIX}{os.getpid()}-{path.stem}-{secrets.token_hex(4)}{path.suffix}"
+    temporary = path.parent / name
+    temporary.touch(exist_ok=False)
     try:
         yield temporary
-        temporary.chmod(0o666 & ~_umask())  # mkstemp's files are for their owner alone
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file in UTF-8, whole or not at all; line ends are written as they are."""
+    with written_whole(path) as temporary:
+        temporary.write_bytes(text.encode("utf-8"))
 
 
 def remove_partial(path: Path) -> None:
@@ -60,9 +63,3 @@ def _is_running(process: int) -> bool:
     except PermissionError:  # another user's
         return True
     return True
-
-
-def _umask() -> int:
-    mask = os.umask(0)  # it can only be read by setting it
-    os.umask(mask)
-    return mask

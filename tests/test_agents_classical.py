@@ -175,7 +175,7 @@ def test_scheduled_speeds_are_those_of_the_angles_they_give(schedule):
         assert cycle.speed == pytest.approx(speed, abs=2e-3)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(numbers=st.lists(st.floats(-2.0, 2.0), min_size=12, max_size=12))
 def test_the_other_foot_is_answered_by_the_mirror_image(numbers):
     odd = ("heading", "ankle_angle", "ankle_rate", "mass_offset", "stance_foot", "heading_error")

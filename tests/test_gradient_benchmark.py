@@ -13,8 +13,7 @@ from agents.learning.gradient.settings import GradientSettings
 from agents.learning.gradient.training import train_gradient
 from agents.learning.ppo import train_ppo
 from agents.learning.ppo_settings import PPOSettings
-from benchmarks.gradient import Curve, policy_in, table
-from benchmarks.learning_plot import save_comparison
+from benchmarks.gradient import Curve, policy_in, save_comparison, table
 
 ID = "LeanYaw/Heading-v0"
 PPO = PPOSettings(steps=256, walkers=8, steps_per_update=16, batch_size=64, epochs=1, hidden=(8, 8))

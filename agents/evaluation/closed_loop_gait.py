@@ -251,8 +251,8 @@ def _described(loop: ClosedLoop, state: Vector) -> ClosedLoopGait:
         coordinates=loop.coordinates,
         gravity_work=sum(outcome.gravity_work for outcome in outcomes) / chord,
         shift_work=sum(outcome.shift_work for outcome in outcomes) / chord,
-        normal_force=min(outcome.least_normal_force for outcome in outcomes),
-        friction_demand=max(outcome.greatest_friction for outcome in outcomes),
+        least_normal_force=min(outcome.least_normal_force for outcome in outcomes),
+        greatest_friction=max(outcome.greatest_friction for outcome in outcomes),
     )
     (left_angle, left_offset), (right_angle, right_offset) = commands.tolist()
     limit = loop.largest_change * (1.0 - _ARRIVED)

@@ -36,7 +36,7 @@ COARSEST, SIZES = 0.25, 14
 """The differences' largest step, in units of the observation, and how many there are, each half the one before."""
 ROUNDING = 2.0**-24
 """Of a number between a half and one in single precision."""
-_DURATION, _X, _Z, _OFFSET = (OUTPUTS.index(name) for name in ("duration", "displacement_x", "displacement_z", "offset"))  # fmt: skip
+_DURATION, _X, _Z, _OFFSET = (OUTPUTS.index(name) for name in ("duration", "displacement_x", "displacement_z", "mass_offset"))  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -250,8 +250,8 @@ class ClosedLoop:
         if status != STEPPED:
             raise FellError(f"the walker fell in the step on its {foot} foot")
         result = self.walker.step(
-            section, stance=foot, inter_leg_angle=given.inter_leg_angle, mass_offset=given.offset,
-            previous_offset=given.offset_before,
+            section, stance=foot, inter_leg_angle=given.inter_leg_angle, mass_offset=given.mass_offset,
+            previous_offset=given.previous_offset,
         )  # fmt: skip
         outputs = np.zeros(len(OUTPUTS))
         outputs[:STATE_SIZE] = after

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -17,19 +16,16 @@ from agents.evaluation.results import RETURN, Row
 from agents.learning.results import TrainingLog
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
-from lean_yaw_env.files import written_whole
 from lean_yaw_env.parameters import Vector
+from lean_yaw_env.rendering.figures import new_figure, save_figure
 from lean_yaw_env.rendering.palette import COMMAND, GOAL, REFERENCE, unit_colour
-from lean_yaw_env.rendering.picture import draw_footprints, new_figure
+from lean_yaw_env.rendering.picture import footprint_figure
 
 WINDOW = 128
 """Episodes that the curve's mean is of."""
 PICTURED_STEPS = 120
 """Steps of an episode that are drawn: two or three commands, at a scale at which footprints can be told apart."""
-_DPI = 150
 _FOOTPRINTS_DPI = 110  # as sharp as a page shows it, and a small file
-_COLUMNS = 5
-_MARGIN = 1.5  # leg lengths around footprints and goals
 _ARROW = 4.0  # leg lengths, of a commanded heading
 _STYLES = {"random": ":", "fixed": "-.", "feedback": "--", "ppo": "-"}
 
@@ -69,8 +65,7 @@ def save_learning_curve(
     axes.grid(color="0.9")
     axes.set_axisbelow(True)
     figure.legend(loc="outside right center", fontsize="small", frameon=False)
-    with written_whole(path) as temporary:
-        figure.savefig(temporary, dpi=_DPI)
+    save_figure(figure, path)
 
 
 def save_agents_footprints(
@@ -91,44 +86,19 @@ def save_agents_footprints(
     }
     parameters = (EnvOptions() if options is None else options).walker_parameters(task_named(task))
     titled = {_title(name, episode): episode for name, episode in episodes.items()}
-    low, high = _extent(list(titled.values()))
-    lines = math.ceil(len(titled) / _COLUMNS)
-    columns = math.ceil(len(titled) / lines)  # lines of equal length, but for the last
-    shape = min(max((high[0] - low[0]) / (high[1] - low[1]), 0.6), 3.0)
-    width = min(2.8, 7.0 / shape)
-    figure = new_figure(width * columns + 0.8, (width * shape + 0.7) * lines + 0.3)
-    axes = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
-    places = list(axes.ravel())
-    for spare in places[len(titled) :]:
-        spare.set_axis_off()
-    draw_footprints(titled, places[: len(titled)], foot_radius=parameters.foot_radius)
-    for place, episode in zip(places, titled.values(), strict=False):
-        _draw_task(place, episode)
-        place.set_xlim(low[1], high[1])
-        place.set_ylim(low[0], high[0])
-        place.xaxis.set_major_locator(MaxNLocator(5, integer=True))
-        place.yaxis.set_major_locator(MaxNLocator(8, integer=True))
-        place.label_outer()
-    for line in axes:
-        line[0].set_ylabel("downhill (leg lengths)")
-    with written_whole(path) as temporary:
-        figure.savefig(temporary, dpi=_FOOTPRINTS_DPI)
+    goals = [(goal.downhill, goal.right) for each in titled.values() for goal in each.goals]
+    figure, panels = footprint_figure(titled, foot_radius=parameters.foot_radius, places=goals)
+    for panel, episode in zip(panels, titled.values(), strict=True):
+        _draw_task(panel, episode)
+        panel.xaxis.set_major_locator(MaxNLocator(5, integer=True))
+        panel.yaxis.set_major_locator(MaxNLocator(8, integer=True))
+    save_figure(figure, path, dpi=_FOOTPRINTS_DPI)
 
 
 def _title(name: str, episode: RecordedEpisode) -> str:
     if episode.fall is not None:
         return f"{name} (fell)"
     return f"{name} (ended early)" if episode.terminated else name
-
-
-def _extent(episodes: Sequence[RecordedEpisode]) -> tuple[Vector, Vector]:
-    """Corners (downhill, right) of what holds every footprint and goal, wide enough to be a picture."""
-    goals = [(goal.downhill, goal.right) for each in episodes for goal in each.goals]
-    points = np.vstack([*(each.footprints for each in episodes), np.reshape(goals, (-1, 2))])
-    low, high = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
-    least = 0.3 * (high - low).max()
-    short = np.maximum(least - (high - low), 0.0)
-    return low - 0.5 * short, high + 0.5 * short
 
 
 def _draw_task(axes: Axes, episode: RecordedEpisode) -> None:

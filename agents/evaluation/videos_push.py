@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from lean_yaw_env.rendering.filming import Frame
-from lean_yaw_env.rendering.optional import require_pillow
 from lean_yaw_env.rendering.palette import ANKLE_AXIS, FAINT_INK, FLOOR, INK
 
 RADIUS = 22.0
@@ -23,10 +22,9 @@ def draw_push(frame: Frame, push: tuple[float, float] | None) -> Frame:
     """
     if push is None:
         return frame
-    image = require_pillow()
-    from PIL import ImageDraw
+    from PIL import Image, ImageDraw
 
-    picture = image.fromarray(frame)
+    picture = Image.fromarray(frame)
     draw = ImageDraw.Draw(picture)
     x, y = _PLACE[0] * frame.shape[1], _PLACE[1]
     draw.ellipse((x - RADIUS, y - RADIUS, x + RADIUS, y + RADIUS), fill=FLOOR, outline=FAINT_INK)

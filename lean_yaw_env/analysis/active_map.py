@@ -57,7 +57,7 @@ _ARRIVED = 1e-9
 _HELPING_SLOPES = (0.01, 0.02)
 """Where to start from a gait that a slope drives, on the way to one that pumping drives."""
 _STATUS = Outcome._fields.index("status")
-_OFFSET = Outcome._fields.index("offset")
+_OFFSET = Outcome._fields.index("mass_offset")
 
 
 @dataclass(frozen=True)
@@ -263,8 +263,8 @@ def cycle_step(
         command=command,
         duration=result.duration,
         displacement=result.displacement,
-        normal_force=result.normal_force,
-        friction_demand=result.friction_demand,
+        least_normal_force=result.least_normal_force,
+        greatest_friction=result.greatest_friction,
         gravity_work=result.energy.gravity_work,
         shift_work=result.energy.shift_work,
     )

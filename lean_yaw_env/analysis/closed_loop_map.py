@@ -48,7 +48,7 @@ SETTLING_STEPS = 400
 
 _TINY = 1e-30
 _STATUS = Outcome._fields.index("status")
-_OFFSET_OUT = Outcome._fields.index("offset")
+_OFFSET_OUT = Outcome._fields.index("mass_offset")
 
 Predict = Callable[[NDArray[np.float32]], ArrayLike]
 """A controller: from observations (n, m) to actions (n, 2). It answers the same observation always the same."""
@@ -232,7 +232,7 @@ class ClosedLoopMap(SectionMap):
         before = state + 1j * _TINY * np.eye(n, len(state))
         named = dict(zip(OUTPUTS, outputs[:, None] + 1j * _TINY * wide, strict=True))
         left = self.interface.remember(before, named)
-        moved = np.column_stack([*(named[each.name] for each in STATE_FIELDS), named["offset"], left])
+        moved = np.column_stack([*(named[each.name] for each in STATE_FIELDS), named["mass_offset"], left])
         return moved[0].real.copy(), moved.imag.T / _TINY
 
     def step_many(self, states: Vector, carried: Vector, foot: int) -> tuple[Vector, Vector, Vector]:

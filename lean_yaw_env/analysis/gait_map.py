@@ -44,8 +44,8 @@ NUMBERS = (
     "speed",
     "step_length",
     "stride_period",
-    "normal_force",
-    "friction_demand",
+    "least_normal_force",
+    "greatest_friction",
     "gravity_work",
     "shift_work",
 )
@@ -314,8 +314,8 @@ def _columns(
     values["speed"][found] = distance / duration
     values["step_length"][found] = 0.5 * distance
     values["stride_period"][found] = duration
-    values["normal_force"][found] = field["least_normal_force"].min(axis=1)
-    values["friction_demand"][found] = field["greatest_friction"].max(axis=1)
+    values["least_normal_force"][found] = field["least_normal_force"].min(axis=1)
+    values["greatest_friction"][found] = field["greatest_friction"].max(axis=1)
     values["gravity_work"][found] = field["gravity_work"].sum(axis=1) / distance
     values["shift_work"][found] = field["shift_work"].sum(axis=1) / distance
     index = np.flatnonzero(found)

@@ -135,14 +135,14 @@ class LimitCycle:
         return self.gravity_work + self.shift_work
 
     @property
-    def normal_force(self) -> float:
+    def least_normal_force(self) -> float:
         """Least normal force, in weights."""
-        return min(step.normal_force for step in self.steps)
+        return min(step.least_normal_force for step in self.steps)
 
     @property
-    def friction_demand(self) -> float:
+    def greatest_friction(self) -> float:
         """Greatest ratio of tangential to normal force."""
-        return max(step.friction_demand for step in self.steps)
+        return max(step.greatest_friction for step in self.steps)
 
     @cached_property
     def turning_radius(self) -> float:

@@ -107,8 +107,8 @@ class PassiveMap(SectionMap):
                     command=_NO_COMMAND,
                     duration=result.duration,
                     displacement=result.displacement,
-                    normal_force=result.normal_force,
-                    friction_demand=result.friction_demand,
+                    least_normal_force=result.least_normal_force,
+                    greatest_friction=result.greatest_friction,
                     gravity_work=result.gravity_work,
                     shift_work=0.0,
                 )

@@ -72,7 +72,7 @@ class CycleStep:
     duration : float
     displacement : shape (2,)
         Between contact reference points: downhill (x) and to the right (z), leg lengths.
-    normal_force, friction_demand : float
+    least_normal_force, greatest_friction : float
         Least normal force (in weights) and greatest ratio of tangential to normal force.
     gravity_work, shift_work : float
         Work of gravity, and of moving the masses, in weight times leg length.
@@ -84,8 +84,8 @@ class CycleStep:
     command: Command
     duration: float
     displacement: Vector
-    normal_force: float
-    friction_demand: float
+    least_normal_force: float
+    greatest_friction: float
     gravity_work: float
     shift_work: float
 

@@ -276,8 +276,3 @@ def reproduce(
         return
     screen.show_reproduction(reproduction)
     typer.echo(f"written: {markdown} and {page}")
-
-
-def main() -> None:
-    """Entry point of ``lean-yaw``."""
-    app()

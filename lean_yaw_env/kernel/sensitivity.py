@@ -34,8 +34,8 @@ def step_sensitivity(body, command, state, side, after, jacobian):
             ),
             Command(
                 command.inter_leg_angle + (seed if column == 5 else 0j),
-                command.offset + (seed if column == 6 else 0j),
-                command.offset_before + (seed if column == 7 else 0j),
+                command.mass_offset + (seed if column == 6 else 0j),
+                command.previous_offset + (seed if column == 7 else 0j),
             ),
             state[0] + (seed if column == 0 else 0j),
             state[1] + (seed if column == 1 else 0j),
@@ -52,7 +52,7 @@ def step_sensitivity(body, command, state, side, after, jacobian):
         jacobian[5, column] = outcome.duration.imag / _TINY
         jacobian[6, column] = outcome.displacement_x.imag / _TINY
         jacobian[7, column] = outcome.displacement_z.imag / _TINY
-        jacobian[8, column] = outcome.offset.imag / _TINY
+        jacobian[8, column] = outcome.mass_offset.imag / _TINY
         jacobian[9, column] = outcome.shift_work.imag / _TINY
         if column == 0:
             after[0] = outcome.heading.real
@@ -63,7 +63,7 @@ def step_sensitivity(body, command, state, side, after, jacobian):
             after[5] = outcome.duration.real
             after[6] = outcome.displacement_x.real
             after[7] = outcome.displacement_z.real
-            after[8] = outcome.offset.real
+            after[8] = outcome.mass_offset.real
             after[9] = outcome.shift_work.real
             status = outcome.status
     return status

@@ -12,7 +12,6 @@ from lean_yaw_env.paper.checks import Check, compare, judge
 from lean_yaw_env.paper.drawing import FAINT, STABLE_FACE, name_axes, new_figure, picture_of
 from lean_yaw_env.paper.results import Columns, Result
 from lean_yaw_env.vehicles import (
-    BRANCH_NAMES,
     EigenvalueBranches,
     LinearBicycle,
     follow_eigenvalues,
@@ -45,7 +44,7 @@ class BicycleEigenvalues:
 
     def columns(self) -> Columns:
         columns: dict[str, Any] = {"speed": self.branches.speeds}
-        for i, name in enumerate(BRANCH_NAMES):
+        for i, name in enumerate(self.branches.names):
             columns[f"{name}_real"] = self.branches.eigenvalues[:, i].real
             columns[f"{name}_imag"] = self.branches.eigenvalues[:, i].imag
         return columns

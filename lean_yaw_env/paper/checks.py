@@ -53,7 +53,7 @@ class Check:
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:
-            raise ValueError(f"verdict must be one of {', '.join(VERDICTS)}; not {self.verdict!r}")
+            raise ValueError(f"verdict must be one of {', '.join(VERDICTS)}, got {self.verdict!r}")
         if not self.agrees and not self.remark:
             raise ValueError(f"check {self.name!r} disagrees, which needs a remark that says how")
 
