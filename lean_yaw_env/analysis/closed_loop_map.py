@@ -202,7 +202,7 @@ class ClosedLoopMap(SectionMap):
         size = len(state)
         if parameter is None:
             step = differentiate_step(self.walker, state[:STATE_SIZE], foot, command)
-            outputs, rows, by_body = step.outputs, step.rows, np.zeros((len(OUTPUTS), 1))
+            outputs, rows, by_body = step.outputs, step.jacobian, np.zeros((len(OUTPUTS), 1))
         else:
             index = BODY_PARAMETERS.index(require_choice("parameter", parameter, self.parameters))
             outputs, every = np.empty(len(OUTPUTS)), np.empty((len(OUTPUTS), INPUTS))

@@ -58,12 +58,12 @@ class StepDerivatives:
     ----------
     outputs : shape (10,)
         What comes out of the step, in the order of ``kernel.jacobian.OUTPUTS``.
-    rows : shape (10, 8)
+    jacobian : shape (10, 8)
         Its derivatives by the section state, the inter-leg angle, the mass offset and the offset before.
     """
 
     outputs: Vector
-    rows: Vector
+    jacobian: Vector
 
     @property
     def state(self) -> Vector:
@@ -73,20 +73,20 @@ class StepDerivatives:
     @property
     def by_state(self) -> Vector:
         """Of the section state by the section state, shape (5, 5)."""
-        return self.rows[:STATE_SIZE, :STATE_SIZE]
+        return self.jacobian[:STATE_SIZE, :STATE_SIZE]
 
     @property
     def by_inter_leg_angle(self) -> Vector:
         """Of the section state, shape (5,); the same of the two offsets."""
-        return self.rows[:STATE_SIZE, STATE_SIZE]
+        return self.jacobian[:STATE_SIZE, STATE_SIZE]
 
     @property
     def by_mass_offset(self) -> Vector:
-        return self.rows[:STATE_SIZE, STATE_SIZE + 1]
+        return self.jacobian[:STATE_SIZE, STATE_SIZE + 1]
 
     @property
     def by_previous_offset(self) -> Vector:
-        return self.rows[:STATE_SIZE, STATE_SIZE + 2]
+        return self.jacobian[:STATE_SIZE, STATE_SIZE + 2]
 
 
 def require_offsets(mass_offset: float | tuple[float, float]) -> tuple[float, float]:

@@ -70,7 +70,7 @@ def move(walker: Any, outcome: Any) -> None:
     walker.ankle_angle = outcome.ankle_angle
     walker.stance_pitch_rate = outcome.stance_pitch_rate
     walker.ankle_rate = outcome.ankle_rate
-    walker.mass_offset = outcome.offset
+    walker.mass_offset = outcome.mass_offset
     walker.duration = outcome.duration
     walker.least_normal_force = outcome.least_normal_force
     walker.greatest_friction = outcome.greatest_friction

@@ -1,17 +1,19 @@
-"""Which agent is better: comparisons on the same episodes, and what they say of a task's claims."""
+"""Which agent is better: comparisons on the same episodes, and whether the agents of a task come in the order that is expected of them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
-from agents.evaluation.intervals import Estimate, Resampled, resample
-from agents.evaluation.results import RETURN, SURVIVAL, Results, Row, is_share, metric_row
-from agents.registry import agent_entry
 from lean_yaw_env.envs.tasks import task_named
+
+from ..registry import agent_entry
+from .intervals import Estimate, Resampled, resample
+from .results import RETURN, SURVIVAL, Results, Row, is_share, metric_row
 
 Verdict = Literal["better", "worse", "tie", "mixed"]
 _VERDICTS: dict[int, Verdict] = {1: "better", -1: "worse", 0: "tie"}
@@ -95,6 +97,20 @@ def samples_of(results: Sequence[Results]) -> dict[str, Sample]:
     return {each.agent: Sample(each, stream) for stream, each in enumerate(results)}
 
 
+def samples_by_task(results: Sequence[Results]) -> dict[str, dict[str, Sample]]:
+    """Results by task and agent, ready to be compared."""
+    return {
+        task: samples_of([each for each in results if each.task == task])
+        for task in dict.fromkeys(each.task for each in results)
+    }
+
+
+def compared_rows(samples: Mapping[str, Mapping[str, Sample]], threads: int = 1) -> list[Row]:
+    """Rows of every task, its agents compared with one another; numpy's loops let threads share the tasks."""
+    with ThreadPoolExecutor(threads) as pool:
+        return [row for rows in pool.map(task_rows, samples.values()) for row in rows]
+
+
 def best_feedback(samples: Mapping[str, Sample]) -> str | None:
     """The feedback controller with the best mean of the task's headline; None if there is none."""
     names = [name for name in samples if agent_entry(name).kind == "feedback"]
@@ -106,7 +122,7 @@ def best_feedback(samples: Mapping[str, Sample]) -> str | None:
     return max(names, key=lambda name: sign * samples[name].drawn(headline).mean)
 
 
-def judged_rows(samples: Mapping[str, Sample]) -> list[Row]:
+def task_rows(samples: Mapping[str, Sample]) -> list[Row]:
     """A row for each metric of each agent, compared with the best feedback controller where there is one.
 
     What some episodes leave undefined, as the time to settle of an agent that never settles, is no ground to compare on.
@@ -151,7 +167,7 @@ def _sign(difference: Estimate) -> int:
 
 
 @dataclass(frozen=True)
-class Claim:
+class Expectation:
     """Whether one agent is better than another at a task, by its headline; ``comparison`` is None where one of them is missing."""
 
     task: str
@@ -164,7 +180,7 @@ class Claim:
         return self.comparison is not None and self.comparison.verdict == "better"
 
 
-def claims_of(task: str, samples: Mapping[str, Sample]) -> list[Claim]:
+def expectations_of(task: str, samples: Mapping[str, Sample]) -> list[Expectation]:
     """Random below fixed, fixed below the best feedback controller, and that below whatever plans or has learned."""
     rival = best_feedback(samples)
     pairs = [("random", "fixed")]
@@ -175,7 +191,7 @@ def claims_of(task: str, samples: Mapping[str, Sample]) -> list[Claim]:
         ]
     headline = task_named(task).headline
     return [
-        Claim(
+        Expectation(
             task,
             worse,
             better,

@@ -1,21 +1,34 @@
-"""One episode recorded step by step, for pictures."""
+"""One episode recorded step by step, and drawn as footprints from above: agents side by side on the same episode."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle
+from matplotlib.ticker import MaxNLocator
 
-from agents.agent import Agent, State, attach
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import Task
 from lean_yaw_env.envs.walker_env import WalkerEnv
-from lean_yaw_env.parameters import Foot, Vector
+from lean_yaw_env.parameters import Foot, Vector, WalkerParameters
+from lean_yaw_env.rendering.figures import save_figure
+from lean_yaw_env.rendering.palette import COMMAND, GOAL, REFERENCE, unit_colour
+from lean_yaw_env.rendering.picture import footprint_figure
 from lean_yaw_env.rendering.scene import Goal
 from lean_yaw_env.walker import Walker
 
+from ..agent import Agent, State, attach
+
+PICTURED_STEPS = 120
+"""Steps of an episode that are drawn: two or three commands, at a scale at which footprints can be told apart."""
 _SAMPLES = 8  # of the centre of mass's path, in each step
+_DPI = 110  # as sharp as a page shows it, and a small file
+_ARROW = 4.0  # leg lengths, of a commanded heading
 
 
 @dataclass(frozen=True)
@@ -39,6 +52,8 @@ class RecordedEpisode:
         Empty for tasks without goals.
     reference_path : shape (k, 2), optional
         The path to be followed: (downhill, right).
+    body : WalkerParameters
+        The walker of the episode: with random bodies, the one that was drawn.
     """
 
     footprints: Vector
@@ -50,6 +65,7 @@ class RecordedEpisode:
     terminated: bool = False
     goals: tuple[Goal, ...] = ()
     reference_path: Vector | None = None
+    body: WalkerParameters = field(default_factory=WalkerParameters)
 
 
 def record_episode(
@@ -60,14 +76,11 @@ def record_episode(
     options: EnvOptions | None = None,
     most_steps: int = 10_000,
 ) -> RecordedEpisode:
-    """Record an episode of an environment's seed, or its first steps, as an agent leads it.
-
-    With randomised bodies the path between heel strikes is the nominal body's.
-    """
+    """Record an episode of an environment's seed, or its first steps, as an agent leads it."""
     chosen = EnvOptions() if options is None else options
     env = WalkerEnv(task, **vars(chosen))
-    walker = Walker(env.rows.parameters)
     observation, info = env.reset(seed=seed)
+    walker = Walker(env.rows.body_parameters(0))  # a random body is drawn by the reset
     attach(agent, env)
     infos, paths = [info], []
     places = [_goal_place(env)]
@@ -95,6 +108,7 @@ def record_episode(
         terminated=bool(terminated),
         goals=_goals(places, env.rows.task.goal_radius),
         reference_path=_reference_path(env.rows.task, memory),
+        body=walker.parameters,
     )
 
 
@@ -142,4 +156,70 @@ def _commands(infos: list[dict[str, Any]]) -> tuple[tuple[int, float], ...]:
         (step, heading)
         for step, heading in enumerate(headings)
         if heading is not None and (step == 0 or heading != headings[step - 1])
+    )
+
+
+def save_agents_footprints(
+    agents: Mapping[str, Agent],
+    task: str,
+    path: Path,
+    *,
+    seed: int,
+    options: EnvOptions | None = None,
+) -> None:
+    """Draw the first steps of one episode, of an environment's seed, for each agent, all to one scale.
+
+    Arrows show commanded headings where they were given, circles goals (full: reached), a broad line the path to be followed.
+    """
+    episodes = {
+        name: record_episode(agent, task, seed=seed, options=options, most_steps=PICTURED_STEPS)
+        for name, agent in agents.items()
+    }
+    titled = {_title(name, episode): episode for name, episode in episodes.items()}
+    goals = [(goal.downhill, goal.right) for each in titled.values() for goal in each.goals]
+    # the same episode has the same body, whoever acts
+    radius = next(iter(titled.values())).body.foot_radius
+    figure, panels = footprint_figure(titled, foot_radius=radius, places=goals)
+    for panel, episode in zip(panels, titled.values(), strict=True):
+        _draw_task(panel, episode)
+        panel.xaxis.set_major_locator(MaxNLocator(5, integer=True))
+        panel.yaxis.set_major_locator(MaxNLocator(8, integer=True))
+    save_figure(figure, path, dpi=_DPI)
+
+
+def _title(name: str, episode: RecordedEpisode) -> str:
+    if episode.fall is not None:
+        return f"{name} (fell)"
+    return f"{name} (ended early)" if episode.terminated else name
+
+
+def _draw_task(axes: Axes, episode: RecordedEpisode) -> None:
+    """What was asked for: headings, goals, a path."""
+    for step, heading in episode.commands:
+        _draw_command(axes, episode.footprints[step], heading)
+    if episode.reference_path is not None:
+        downhill, right = episode.reference_path.T
+        axes.plot(right, downhill, color=unit_colour(REFERENCE), linewidth=3.0, alpha=0.45, zorder=0.5)  # fmt: skip
+    for goal in episode.goals:
+        colour = unit_colour(GOAL)
+        axes.add_patch(
+            Circle(
+                (goal.right, goal.downhill),
+                goal.radius,
+                facecolor=colour if goal.reached else "none",
+                edgecolor=colour,
+                linewidth=1.5,
+            )
+        )
+
+
+def _draw_command(axes: Axes, footprint: Vector, heading: float) -> None:
+    """An arrow from a footprint towards a heading; a positive one is to the left."""
+    downhill, right = footprint
+    tip = (right - _ARROW * np.sin(heading), downhill + _ARROW * np.cos(heading))
+    axes.annotate(
+        "",
+        xy=tip,
+        xytext=(right, downhill),
+        arrowprops={"arrowstyle": "-|>", "color": unit_colour(COMMAND), "linewidth": 1.5},
     )
