@@ -24,12 +24,10 @@ from lean_yaw_env.analysis.section_map import (
     SectionMap,
     section_map_of,
 )
-from lean_yaw_env.analysis.stride import differentiate_step, require_offsets, require_stepped
+from lean_yaw_env.analysis.stride import differentiate_step, require_offsets
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.batch import step_batch
-from lean_yaw_env.kernel.jacobian import OUTPUTS
 from lean_yaw_env.kernel.records import Command, Outcome
-from lean_yaw_env.kernel.sensitivity import INPUTS, step_sensitivity
 from lean_yaw_env.parameters import (
     INTER_LEG_ANGLE,
     MIRROR,
@@ -37,11 +35,12 @@ from lean_yaw_env.parameters import (
     STATE_SIZE,
     Foot,
     Vector,
+    WalkerParameters,
     require_inter_leg_angle,
     require_state,
 )
 from lean_yaw_env.validation import require_choice, require_count
-from lean_yaw_env.walker import SIDE, StepResult, Walker, require_completed
+from lean_yaw_env.walker import StepResult, Walker, require_completed
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -106,7 +105,7 @@ class ActiveMap(SectionMap):
 
     @property
     def free(self) -> list[int]:
-        return [0, 1, 2, 3, 4] if has_downhill(self.walker) else [1, 2, 3, 4]
+        return [0, 1, 2, 3, 4] if has_downhill(self.walker.parameters) else [1, 2, 3, 4]
 
     @property
     def stander(self) -> Walker:
@@ -145,20 +144,15 @@ class ActiveMap(SectionMap):
         return steps
 
     def linear_step(self, state: Vector, k: int, parameter: str | None) -> Linearised:
-        command, foot = self._command(k), FEET_IN_TURN[k % 2]
-        exact = np.zeros((STATE_SIZE, STATE_SIZE))
-        if parameter is None:
-            step = differentiate_step(self.walker, state, foot, command)
-            return Linearised(step.state, step.by_state, np.zeros(STATE_SIZE), exact)
-        require_choice("parameter", parameter, self.parameters)
-        outputs, rows = np.empty(len(OUTPUTS)), np.empty((len(OUTPUTS), INPUTS))
-        status = step_sensitivity(
-            self.walker.parameters.body(), command, state, SIDE[foot], outputs, rows
+        step = differentiate_step(
+            self.walker, state, FEET_IN_TURN[k % 2], self._command(k), with_body=parameter is not None
         )
-        require_stepped(status, self.walker, state, f"in step {k + 1}")
-        by_parameter = rows[:STATE_SIZE, STATE_SIZE:] @ self._direction(parameter, k)
+        by_parameter = np.zeros(STATE_SIZE)
+        if parameter is not None:
+            by_inputs = step.jacobian[:STATE_SIZE, STATE_SIZE:]
+            by_parameter = by_inputs @ self._direction(parameter, k)
         return Linearised(
-            outputs[:STATE_SIZE], rows[:STATE_SIZE, :STATE_SIZE], by_parameter, exact
+            step.state, step.by_state, by_parameter, np.zeros((STATE_SIZE, STATE_SIZE))
         )
 
     def step_many(self, states: Vector, carried: Vector, foot: int) -> tuple[Vector, Vector, Vector]:
@@ -219,8 +213,9 @@ class ActiveMap(SectionMap):
         return Command(self.inter_leg_angle, self.mass_offset[k % 2], self.mass_offset[(k + 1) % 2])
 
     def _direction(self, parameter: str, k: int) -> Vector:
-        """How a parameter enters the inputs of step ``k`` after the state."""
-        direction = np.zeros(INPUTS - STATE_SIZE)
+        """How a parameter enters the inputs of step ``k`` after the state: the command, then the body."""
+        require_choice("parameter", parameter, self.parameters)
+        direction = np.zeros(3 + len(BODY_PARAMETERS))
         if parameter in BODY_PARAMETERS:
             direction[3 + BODY_PARAMETERS.index(parameter)] = 1.0
             return direction
@@ -233,9 +228,9 @@ class ActiveMap(SectionMap):
         return direction
 
 
-def has_downhill(walker: Walker) -> bool:
+def has_downhill(parameters: WalkerParameters) -> bool:
     """Whether headings differ: not on the level, nor where the slope turns with the walker."""
-    return walker.parameters.slope != 0.0 and not walker.parameters.slope_turns
+    return parameters.slope != 0.0 and not parameters.slope_turns
 
 
 def moved_walker(walker: Walker, parameter: str, value: float) -> Walker:

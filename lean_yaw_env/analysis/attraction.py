@@ -68,7 +68,7 @@ def basin(
     xarray.Dataset
         Over x and y: ``steps`` completed, ``ending`` (0 survived, otherwise how it fell, see the
         variable's ``meanings``), and without a ``centre`` the ``distance`` of the last state from the gait (largest
-        coordinate of the free ones, on the foot that stands). Attribute ``centre``: the state.
+        coordinate of the free ones, on the foot that stands). Attribute ``centre``: the state by coordinate, as JSON.
 
     Raises
     ------
@@ -346,6 +346,6 @@ def _dataset(
         coords=axes,
         attrs={
             "question": json.dumps({**section_map.question(), "n_steps": n_steps}, sort_keys=True),
-            "centre": json.dumps(centre.round(12).tolist()),
+            "centre": json.dumps(dict(zip(section_map.names, centre.round(12).tolist(), strict=True))),
         },
     )

@@ -29,14 +29,13 @@ from lean_yaw_env.analysis.section_map import (
     SectionMap,
 )
 from lean_yaw_env.analysis.slopes import Slopes, slopes_of
-from lean_yaw_env.analysis.stride import differentiate_step, require_stepped
+from lean_yaw_env.analysis.stride import differentiate_step
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.jacobian import OUTPUTS
 from lean_yaw_env.kernel.records import STEPPED, Command, Outcome
-from lean_yaw_env.kernel.sensitivity import INPUTS, step_sensitivity
 from lean_yaw_env.parameters import MIRROR, STATE_FIELDS, STATE_SIZE, Foot, Vector, require_state
 from lean_yaw_env.validation import require_array, require_choice, require_count
-from lean_yaw_env.walker import SIDE, Walker, require_completed
+from lean_yaw_env.walker import Walker, require_completed
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -135,7 +134,7 @@ class ClosedLoopMap(SectionMap):
 
     @property
     def free(self) -> list[int]:
-        alike = () if has_downhill(self.walker) else self.interface.headings
+        alike = () if has_downhill(self.walker.parameters) else self.interface.headings
         return [k for k, name in enumerate(self.names) if name not in alike]
 
     @property
@@ -199,25 +198,19 @@ class ClosedLoopMap(SectionMap):
         foot = FEET_IN_TURN[k % 2]
         asked = self.slopes(state, foot)
         command = self._command(state, asked.values)
-        size = len(state)
-        if parameter is None:
-            step = differentiate_step(self.walker, state[:STATE_SIZE], foot, command)
-            outputs, rows, by_body = step.outputs, step.jacobian, np.zeros((len(OUTPUTS), 1))
-        else:
-            index = BODY_PARAMETERS.index(require_choice("parameter", parameter, self.parameters))
-            outputs, every = np.empty(len(OUTPUTS)), np.empty((len(OUTPUTS), INPUTS))
-            status = step_sensitivity(
-                self.walker.parameters.body(), command, state, SIDE[foot], outputs, every
-            )
-            require_stepped(status, self.walker, state, f"in step {k + 1}")
-            rows, by_body = every[:, :8], every[:, 8 + index, None]
+        step = differentiate_step(
+            self.walker, state[:STATE_SIZE], foot, command, with_body=parameter is not None
+        )
         # by the state, the two commands and the parameter
+        size = len(state)
         wide = np.zeros((len(OUTPUTS), size + 3))
-        wide[:, :STATE_SIZE] = rows[:, :STATE_SIZE]
-        wide[:, OFFSET] = rows[:, STATE_SIZE + 2]
-        wide[:, size : size + 2] = rows[:, STATE_SIZE : STATE_SIZE + 2]
-        wide[:, size + 2 :] = by_body
-        image, found = self._after(state, outputs, wide)
+        wide[:, :STATE_SIZE] = step.jacobian[:, :STATE_SIZE]
+        wide[:, OFFSET] = step.jacobian[:, STATE_SIZE + 2]
+        wide[:, size : size + 2] = step.jacobian[:, STATE_SIZE : STATE_SIZE + 2]
+        if parameter is not None:
+            index = BODY_PARAMETERS.index(require_choice("parameter", parameter, self.parameters))
+            wide[:, size + 2] = step.jacobian[:, STATE_SIZE + 3 + index]
+        image, found = self._after(state, step.outputs, wide)
         by_command = found[:, size : size + 2]
         return Linearised(
             image,

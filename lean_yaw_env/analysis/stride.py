@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike
 from lean_yaw_env.errors import FellError
 from lean_yaw_env.kernel.jacobian import INPUTS, OUTPUTS, step_jacobian
 from lean_yaw_env.kernel.records import Command
+from lean_yaw_env.kernel.sensitivity import INPUTS as ALL_INPUTS
+from lean_yaw_env.kernel.sensitivity import step_sensitivity
 from lean_yaw_env.parameters import (
     INTER_LEG_ANGLE,
     STATE_SIZE,
@@ -58,8 +60,9 @@ class StepDerivatives:
     ----------
     outputs : shape (10,)
         What comes out of the step, in the order of ``kernel.jacobian.OUTPUTS``.
-    jacobian : shape (10, 8)
-        Its derivatives by the section state, the inter-leg angle, the mass offset and the offset before.
+    jacobian : shape (10, 8) or (10, 14)
+        Its derivatives by the section state, the inter-leg angle, the mass offset, the offset before and, if asked for, the body's first
+        six constants.
     """
 
     outputs: Vector
@@ -106,7 +109,7 @@ def require_offsets(mass_offset: float | tuple[float, float]) -> tuple[float, fl
 
 
 def differentiate_step(
-    walker: Walker, state: ArrayLike, stance: Foot, command: Command
+    walker: Walker, state: ArrayLike, stance: Foot, command: Command, *, with_body: bool = False
 ) -> StepDerivatives:
     """One walking step with its exact derivatives (complex step through the kernel; the landing time's share included).
 
@@ -118,19 +121,19 @@ def differentiate_step(
         If the integrator fails.
     """
     start = require_state(state)
-    outputs, rows = np.empty(len(OUTPUTS)), np.empty((len(OUTPUTS), INPUTS))
-    status = step_jacobian(
-        walker.parameters.body(), command, *start.tolist(), SIDE[stance], outputs, rows
-    )
-    require_stepped(status, walker, start, f"in the step on its {stance} foot")
-    return StepDerivatives(outputs, rows)
-
-
-def require_stepped(status: float, walker: Walker, start: Vector, where: str) -> None:
-    """Raise ``FellError`` or ``SolverError`` unless a kernel has completed a step."""
+    body = walker.parameters.body()
+    outputs = np.empty(len(OUTPUTS))
+    rows = np.empty((len(OUTPUTS), ALL_INPUTS if with_body else INPUTS))
+    if with_body:
+        status = step_sensitivity(body, command, start, SIDE[stance], outputs, rows)
+    else:
+        status = step_jacobian(body, command, *start.tolist(), SIDE[stance], outputs, rows)
     raise_for_failure(status, start, walker.parameters)
     if status in FALL_OF_STATUS:
-        raise FellError(f"the walker fell {FALL_OF_STATUS[status].value} {where}")
+        raise FellError(
+            f"the walker fell {FALL_OF_STATUS[status].value} in the step on its {stance} foot"
+        )
+    return StepDerivatives(outputs, rows)
 
 
 def stride_map(
