@@ -38,10 +38,12 @@ class FallCode(IntEnum):
     """No fall: the integrator gave the step up, and the episode ends where the step began."""
 
     @property
-    def description(self) -> str:
-        """The fall's name as ``lean_yaw_env.Fall`` has it, "solver", or "none"."""
+    def word(self) -> str | None:
+        """The fall's name as ``lean_yaw_env.Fall`` has it, "solver", or None for no fall."""
+        if self is FallCode.SOLVER:
+            return "solver"
         fall = FALL_OF_STATUS.get(float(self) + records.STEPPED)
-        return self.name.lower() if fall is None else fall.value
+        return None if fall is None else fall.value
 
 
 class Info(NamedTuple):
@@ -94,7 +96,7 @@ FALL_INFO = Info(
     "fall",
     "walker.fall",
     "how the last step ended, as an integer: "
-    + ", ".join(f"{code.value} {code.description}" for code in FallCode),
+    + ", ".join(f"{code.value} {code.word or 'none'}" for code in FallCode),
 )
 PUSH_INFOS = tuple(
     Info(f"{name}_push", f"walker.{name}_push", f"the last push on the {name} rate; with pushes")

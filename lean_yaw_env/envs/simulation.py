@@ -151,6 +151,13 @@ class Simulation:
         """Show records that were set by hand: derived fields and observations anew, without a step."""
         self._judge(*self._judged(_PLACE, self._nobody, None, 0, self.n))
 
+    def take_over(self, other: Simulation, rows: NDArray[np.int64]) -> None:
+        """Put walkers of another simulation of this task, those of ``rows`` (n,), in the place of these; ``observe`` shows them."""
+        self.walkers[:] = other.walkers[rows]
+        self.tasks[:] = other.tasks[rows]
+        if len(self.bodies) > 1:
+            self.bodies[:] = other.bodies[rows]
+
     def check_options(self, options: dict[str, Any]) -> dict[str, Any]:
         """Reset options as numbers, or ``ValueError``."""
         checked: dict[str, Any] = {}

@@ -201,5 +201,4 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
             self._renderer.show(self._footage.scene(self._fall()), RENDER_FPS)
 
     def _fall(self) -> str | None:
-        code = FallCode(self.simulation.falls[0])
-        return code.description if code else None
+        return FallCode(self.simulation.falls[0]).word
