@@ -127,6 +127,8 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         if not simulation.step_one(self._infos):
             raise ValueError(f"action must be numbers in [-1, 1], got {chosen.tolist()}")
         (terminated,), (truncated,) = simulation.ends.tolist()
+        if terminated:
+            simulation.note_failures()
         self._running = not (terminated or truncated)
         if self._footage is not None:
             self._footage.extend()
@@ -201,5 +203,4 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
             self._renderer.show(self._footage.scene(self._fall()), RENDER_FPS)
 
     def _fall(self) -> str | None:
-        code = FallCode(self.simulation.falls[0])
-        return code.description if code else None
+        return FallCode(self.simulation.falls[0]).word
