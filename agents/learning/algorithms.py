@@ -16,7 +16,6 @@ from ..policies.policy import Policy, PolicyCard, package_versions
 from ..policies.storage import task_of
 from ..settings import tuned
 from .gradient.learner import GradientLearner, GradientSettings
-from .gradient.tasks import FORMULAS
 from .learner import LearnerSettings, MakeLearner, settings_to_plain, torch_threads
 from .ppo import PPOLearner, PPOSettings
 from .recorder import Recorder, Report, TrainingLog
@@ -50,7 +49,7 @@ class Algorithm:
 ALGORITHMS: dict[str, Algorithm] = {
     "ppo": Algorithm(PPOSettings, PPOLearner),
     "sac": Algorithm(SACSettings, SACLearner),
-    "apg": Algorithm(GradientSettings, GradientLearner, FORMULAS),
+    "apg": Algorithm(GradientSettings, GradientLearner),
 }
 """By the names that their policies carry."""
 
