@@ -13,11 +13,13 @@ from agents import load, save
 from agents.controllers.simple import FixedController
 from agents.evaluation.scoring import run_seeds
 from agents.learning.algorithms import settings_for, train
-from agents.learning.gradient.differentiation import bounded
-from agents.learning.gradient.learner import GradientSettings
-from agents.learning.gradient.networks import make_policy
-from agents.learning.gradient.returns import Window, time_discounted_returns
-from agents.learning.gradient.walkers import DifferentiableWalkers
+from agents.learning.apg import GradientSettings, make_policy
+from agents.learning.differentiable import (
+    DifferentiableWalkers,
+    Window,
+    bounded,
+    time_discounted_returns,
+)
 from agents.learning.recorder import CheckpointError
 from agents.seeds import TUNING_SEEDS
 from lean_yaw_env.envs.linearised import LinearisedSteps
