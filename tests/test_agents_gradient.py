@@ -326,6 +326,13 @@ def test_training_is_decided_by_its_seed():
     assert (first.policy.weights["layers.0.weight"] != other.policy.weights["layers.0.weight"]).any()  # fmt: skip
 
 
+def test_a_training_logs_each_of_its_episodes_by_itself():
+    log = trained().log
+    # every step belongs to one episode, and some are not over when the training is
+    assert 0 < log.lengths.sum() <= TINY.steps
+    assert len(log.lengths) > TINY.walkers
+
+
 def test_interrupted_training_goes_on_bit_for_bit(tmp_path: Path):
     whole = trained()
     file = tmp_path / "checkpoint.safetensors"

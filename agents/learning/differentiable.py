@@ -161,6 +161,7 @@ class DifferentiableWalkers:
         """Begin new episodes where they ended."""
         if not ended.any():
             return
+        self._returns[ended], self._lengths[ended] = 0.0, 0
         fresh, _ = self.env.reset(options={"reset_mask": ended})
         mask = torch.from_numpy(ended)[:, None]
         values = torch.from_numpy(self._linearised.values())
