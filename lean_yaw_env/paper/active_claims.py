@@ -11,7 +11,7 @@ from lean_yaw_env.analysis import Disturbance, find_limit_cycle, largest_disturb
 from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import Check, compare, judge
 from lean_yaw_env.paper.results import Result
-from lean_yaw_env.paper.steering import circling_gait, circling_radius, circling_walker
+from lean_yaw_env.paper.steering import circling_gait, circling_walker
 from lean_yaw_env.paper.velocity_figure import flat_critical_speed
 from lean_yaw_env.paper.walkers import FlatGait, flat_active_walker, table_1_gait
 from lean_yaw_env.parameters import STATE_FIELDS, WalkerParameters
@@ -104,7 +104,7 @@ def _circle_check() -> Check:
     return judge(
         numbers.CIRCLES,
         holds,
-        ours=f"greatest |λ| {abs(gait.eigenvalues[0]):.3f}, radius {circling_radius(gait):.2f}, "
+        ours=f"greatest |λ| {abs(gait.eigenvalues[0]):.3f}, radius {gait.turning_radius:.2f}, "
         f"{walk.n_steps} steps walked",
         remark="" if holds else "It falls, or the circle is unstable.",
     )
