@@ -18,7 +18,7 @@ from lean_yaw_env.paper.numbers import (
     statement,
 )
 from lean_yaw_env.paper.results import Result
-from lean_yaw_env.paper.steering import circling_gait, circling_radius, circling_walker
+from lean_yaw_env.paper.steering import circling_gait, circling_walker
 from lean_yaw_env.paper.velocity_figure import flat_critical_speed
 from lean_yaw_env.paper.walkers import FlatGait, flat_active_walker, table_1_gait
 from lean_yaw_env.parameters import STATE_FIELDS, WalkerParameters
@@ -114,7 +114,7 @@ def _circle_check() -> Check:
     return judge(
         statement("slope that turns"),
         holds,
-        ours=f"greatest |λ| {abs(gait.eigenvalues[0]):.3f}, radius {circling_radius(gait):.2f}, "
+        ours=f"greatest |λ| {abs(gait.eigenvalues[0]):.3f}, radius {gait.turning_radius:.2f}, "
         f"{walk.n_steps} steps walked",
         unless="It falls, or the circle is unstable.",
     )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lean_yaw_env.analysis.path import radius_of_walk
 from lean_yaw_env.paper.checks import compare, judge
 from lean_yaw_env.paper.drawing import FAINT, name_axes, new_figure, picture_of
 from lean_yaw_env.paper.numbers import LARGE_OFFSET, SMALL_OFFSET, number, statement
@@ -15,10 +16,8 @@ from lean_yaw_env.paper.results import Columns, Result
 from lean_yaw_env.paper.steering import (
     asymptotic_heading,
     circling_gait,
-    circling_radius,
     settled_heading,
     turned,
-    turning_radius,
 )
 from lean_yaw_env.paper.walkers import table_1_gait
 from lean_yaw_env.parameters import WalkerParameters
@@ -192,10 +191,9 @@ def figure_15() -> Result:
             ),
             compare(
                 number("turning radius"),
-                circling_radius(circling_gait()),
-                remark="Of the circle on a slope that turns along; on the fixed slope no arc is a "
-                f"circle: length walked over angle turned is {turning_radius(walks.tight):.1f} on "
-                "the first 90°.",
+                circling_gait().turning_radius,
+                remark="Of the circle of the hip axle's middle on a slope that turns along; on the fixed slope "
+                f"the circle that fits its first 90° best has {radius_of_walk(Walker(), walks.tight):.1f}.",
             ),
             judge(
                 statement("tight turn's end"),
