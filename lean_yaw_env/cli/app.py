@@ -53,7 +53,7 @@ def gait(
 ) -> Output:
     """Find a walker's limit cycle and print it with its multipliers; the defaults are Table 1's."""
     from lean_yaw_env.analysis import find_limit_cycle
-    from lean_yaw_env.analysis.section_map import section_map_of
+    from lean_yaw_env.analysis import section_map_of
 
     offsets: dict[str, Any] = {
         "inter_leg_angle": inter_leg_angle,
