@@ -68,10 +68,8 @@ def _walk_step(row, outcome):
     result = walking_step(
         _body(row), _command(row), row[s], row[s + 1], row[s + 2], row[s + 3], row[s + 4], row[SIDE]
     )
-    k = 0
-    for value in result:
+    for k, value in enumerate(result):
         outcome[k] = value
-        k += 1
 
 
 @_compiled
@@ -88,10 +86,8 @@ def _swing_step(row, outcome):
         row[INTER_LEG],
         row[PASSIVE_SIDE],
     )
-    k = 0
-    for value in result:
+    for k, value in enumerate(result):
         outcome[k] = value
-        k += 1
 
 
 def walker_step(inputs, outcome):
