@@ -1,8 +1,8 @@
-"""Compile the kernel to a WebAssembly module, from Numba's own intermediate code, and write down the layout of its rows.
+"""Compile the kernel to a WebAssembly module, from Numba's own intermediate code, and write down names and numbers for the page.
 
 ``python web/build_kernel.py`` needs the extra ``web`` (llvmlite's wasm32 target comes with Numba, the linker with ``ziglang``) and writes
-``src/kernel/kernel.wasm`` and ``src/kernel/layout.ts``. Both are kept in the repository; the module carries a digest of the sources it was
-compiled from, so that a test can tell a stale one.
+``src/kernel/kernel.wasm``, ``src/kernel/layout.ts`` and ``src/physics/vehicle_data.ts``. All are kept in the repository. The module
+carries a digest of the sources it was compiled from, so that a test can tell a stale one.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ WEB = Path(__file__).parent
 KERNEL = WEB.parent / "lean_yaw_env" / "kernel"
 MODULE = WEB / "src" / "kernel" / "kernel.wasm"
 LAYOUT = WEB / "src" / "kernel" / "layout.ts"
+VEHICLES = WEB / "src" / "physics" / "vehicle_data.ts"
 _SECTION = "sources"  # the custom section with the digest
 
 # Code for no processor in particular, and one number at a time: WebAssembly takes what is left
@@ -37,8 +39,8 @@ _LLVM_TYPES = {"none": "void", "float64": "double", "int32": "i32", "float64*": 
 
 
 def sources() -> list[Path]:
-    """The files that the module is compiled from: this program's, and the kernel's that they import, directly or not."""
-    found = {WEB / "runtime.c", Path(__file__)}
+    """The files that the module is compiled from: the page's, and the kernel's that they import, directly or not."""
+    found = {WEB / "runtime.c"}
     waiting = [WEB / "kernel_entries.py"]
     while waiting:
         path = waiting.pop()
@@ -244,6 +246,20 @@ def layout() -> str:
     return "\n".join([*lines, f"export const STATUS = {{ {named} }} as const;", ""])
 
 
+def vehicles() -> str:
+    """The package's bicycles and skateboard as TypeScript: SI units."""
+    from lean_yaw_env.vehicles import BENCHMARK_2007, Skateboard, parameters_2005
+
+    tables = {
+        "PAPER_BICYCLE": asdict(parameters_2005()),
+        "BENCHMARK_BICYCLE": asdict(BENCHMARK_2007),
+        "SKATEBOARD": asdict(Skateboard()),
+    }
+    lines = ["// Written by build_kernel.py from lean_yaw_env.vehicles; do not edit. SI units, angles in radians.", ""]
+    lines += [f"export const {name} = {json.dumps(table, indent=2)};" for name, table in tables.items()]
+    return "\n".join([*lines, ""])
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true", help="only say whether the module is stale")
@@ -254,6 +270,7 @@ def main() -> None:
     MODULE.parent.mkdir(parents=True, exist_ok=True)
     MODULE.write_bytes(module)
     LAYOUT.write_text(layout())
+    VEHICLES.write_text(vehicles())
     print(f"{MODULE}: {len(module)} bytes")
 
 

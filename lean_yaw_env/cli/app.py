@@ -242,6 +242,26 @@ def skateboard(
 
 @app.command()
 @reporting_errors
+def view(
+    walk: Annotated[
+        Path | None, typer.Option(help="Show this walk, saved with Walk.save.")
+    ] = None,
+    port: Annotated[int, typer.Option(help="Of this machine; 0 takes a free one.")] = 0,
+    browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
+) -> None:
+    """Show the walkers in the browser, computed there by the package's own kernel; served to this machine only."""
+    from lean_yaw_env.viewer import view as view_page
+
+    server = view_page(walk, port=port, open_browser=browser)
+    typer.echo(f"the page is at {server.address} until Ctrl-C")
+    try:
+        server.wait()
+    except KeyboardInterrupt:
+        server.close()
+
+
+@app.command()
+@reporting_errors
 def reproduce(
     names: Annotated[
         list[str],

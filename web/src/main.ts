@@ -1,12 +1,15 @@
 import "./style.css";
 import type { App, Exhibit } from "./app";
+import { BicycleExhibit, SkateboardExhibit } from "./exhibits/vehicle_exhibit";
 import { WalkExhibit } from "./exhibits/walk_exhibit";
 import { Kernel } from "./kernel/kernel";
 import { Stage, type View } from "./scene/stage";
 import { FrameTimes } from "./share/frame_times";
 import { readLink, writeLink, type Settings } from "./share/link";
 import { units } from "./share/units";
+import { parseWalk, type SavedWalk } from "./share/files";
 import { byId, h } from "./ui/dom";
+import { SharePanel } from "./ui/share_panel";
 import { Transport } from "./ui/transport";
 import { UnitsSwitch } from "./ui/units_switch";
 
@@ -20,6 +23,7 @@ async function main(): Promise<void> {
   const notice = byId("notice");
   let playing = true;
   let rate = 0.4;
+  let held = false;
   let active: Exhibit;
 
   const app: App = {
@@ -38,12 +42,25 @@ async function main(): Promise<void> {
       transport.showRate(value);
     },
   };
-  const exhibits: Exhibit[] = [new WalkExhibit(app, "planar"), new WalkExhibit(app, "passive"), new WalkExhibit(app, "steered")];
+  const exhibits: Exhibit[] = [
+    new SkateboardExhibit(app), new BicycleExhibit(app), new WalkExhibit(app, "planar"), new WalkExhibit(app, "passive"),
+    new WalkExhibit(app, "steered"),
+  ]; // prettier-ignore
   const frames = new FrameTimes(byId("frames"));
   const switcher = new UnitsSwitch(byId("units"), () => {
     active.refresh();
     app.changed();
   });
+  const share = new SharePanel(canvas, {
+    table: () => (active instanceof WalkExhibit ? active.table() : null),
+    open: openWalk,
+    next(duration) {
+      active.frame(duration * rate * active.timeScale(), duration);
+      stage.render();
+    },
+    hold: (value) => (held = value),
+  });
+  byId("share").append(share.element);
   const transport = new Transport(byId("transport"), canvas, {
     play: () => app.play(!playing),
     step: () => active.stepOnce(),
@@ -71,12 +88,21 @@ async function main(): Promise<void> {
       tab.setAttribute("aria-selected", String(each === exhibit));
       tab.tabIndex = each === exhibit ? 0 : -1;
     });
+    tabs.get(exhibit)!.scrollIntoView({ block: "nearest", inline: "center" });
     byId("panel-title").textContent = exhibit.title;
     byId("panel-subtitle").textContent = exhibit.subtitle;
     transport.setWalk(exhibit.isWalk);
+    share.setWalk(exhibit.isWalk);
     exhibit.enter(from);
     if (!playing) exhibit.frame(0, 0);
     app.changed();
+  }
+
+  function openWalk(walk: SavedWalk): void {
+    const steered = exhibits.find((exhibit) => exhibit.id === "steered") as WalkExhibit;
+    open(steered, {});
+    steered.open(walk);
+    app.play(true);
   }
 
   const tabs = new Map<Exhibit, HTMLButtonElement>();
@@ -99,6 +125,13 @@ async function main(): Promise<void> {
   if (link.quality) stage.setQuality(Number(link.quality));
   if (Number(link.rate) > 0) app.setRate(Number(link.rate));
   open(exhibits.find((exhibit) => exhibit.id === link.tab) ?? exhibits.at(-1)!, link);
+  // `lean-yaw view --walk FILE` serves the file beside the page
+  if (link.walk) {
+    const address = new URL(link.walk, location.href);
+    const response = address.origin === location.origin ? await fetch(address) : Response.error();
+    if (!response.ok) throw new Error(`The walk ${link.walk} could not be read.`);
+    openWalk(parseWalk(await response.text()));
+  }
 
   const observer = new ResizeObserver(() => {
     stage.resize();
@@ -109,13 +142,14 @@ async function main(): Promise<void> {
   let last = performance.now();
   function frame(now: number): void {
     const real = Math.min(Math.max(now - last, 0) / 1000, LONGEST_FRAME);
-    if (!document.hidden) stage.adapt(now - last);
+    if (!document.hidden && !held) stage.adapt(now - last);
     last = now;
+    requestAnimationFrame(frame);
+    if (held) return;
     frames.begin();
     active.frame(playing ? real * rate * active.timeScale() : 0, real);
     stage.render();
     frames.end();
-    requestAnimationFrame(frame);
   }
   requestAnimationFrame(frame);
   document.documentElement.dataset.ready = "true";

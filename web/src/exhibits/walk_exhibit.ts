@@ -8,6 +8,7 @@ import { MultipliersPanel } from "../panels/multipliers";
 import { PhasePanel, ReturnMapPanel } from "../panels/phase";
 import { findCycle, type Cycle } from "../physics/cycle";
 import { CycleFinder } from "../physics/finder";
+import { passiveCycleNear } from "../physics/passive_cycle";
 import { halfArc, shapeOf, type Vector } from "../physics/geometry";
 import { Walk, type Kind, type StepRecord } from "../physics/walk";
 import { mirrored, TABLE_1, type Parameters } from "../physics/walker";
@@ -17,7 +18,7 @@ import { PALETTE } from "../scene/palette";
 import { PushArrow } from "../scene/push_arrow";
 import { Trail } from "../scene/trail";
 import { WalkerModel } from "../scene/walker_model";
-import { asTable, download, parametersOf, type SavedWalk } from "../share/files";
+import { asTable, parametersOf, type SavedWalk } from "../share/files";
 import type { Settings } from "../share/link";
 import * as units from "../share/units";
 import { Facts, h, section } from "../ui/dom";
@@ -62,6 +63,8 @@ interface Variety {
   push: [number, number];
   presets: [string, Partial<Parameters>][];
   story: string;
+  /** A state near the gait of the defaults. */
+  guess: State;
 }
 
 const PASSIVE: Parameters = { ...TABLE_1, hip_width: 0, ankle_tilt: 0.15, slope: 0.00058 };
@@ -78,6 +81,7 @@ export const VARIETIES: Record<Kind, Variety> = {
     push: [0.012, 0],
     presets: [["Point feet", { foot_radius: 0, slope: 0.009 }], ["Round feet", { foot_radius: 0.5, slope: 0.004 }], ["Limping (steeper)", { foot_radius: 0, slope: 0.0165 }]],
     story: "No motor, no control: a slope gives the energy that every heel strike takes. Steeper than about 0.015 the gait doubles its period: it limps.",
+    guess: [0, 0.2, 0, -0.2, 0, 0.016],
   },
   passive: {
     id: "space",
@@ -90,6 +94,7 @@ export const VARIETIES: Record<Kind, Variety> = {
     push: [0, 0.006],
     presets: [["Table 3 of the paper", {}], ["Steeper", { slope: 0.0012 }], ["With a hip", { hip_width: 0.01 }]],
     story: "In space the walker can fall sideways. Its ankle axis turns the foot as the leg leans. At small slopes it walks slowly, so the axis must stand steep; even then it is easily disturbed.",
+    guess: [0, 0.1527, 0, -0.1205, 0, 0.003],
   },
   steered: {
     id: "steered",
@@ -102,6 +107,7 @@ export const VARIETIES: Record<Kind, Variety> = {
     push: [0, 0.13],
     presets: [["Table 1 of the paper", {}], ["No hip", { hip_width: 0 }], ["Flat feet, steep", { foot_radius: 0.2, slope: 0.03 }], ["In circles", { mass_offset: 0.03, slope_turns: true }]],
     story: "Whatever leans must turn into its fall. The tilted ankle axes see to that: as a leg leans, its foot turns. Above a critical speed that is enough to stay up.",
+    guess: [0.0015, 0.1554, -0.0041, -0.4151, -0.0702],
   },
 };
 
@@ -110,6 +116,10 @@ const STEER_OFFSET = 0.045;
 const STRIDE_CHANGE = 0.02;
 const COMPANY_GAP = 0.85;
 const PATH_POINTS = 14;
+/** A walker in the plane has no hip width; it is drawn with one, so that its legs can be told apart. */
+const DRAWN_WIDTH = 0.17;
+/** Scale of the stage for so many walkers side by side. */
+const SCALES: Record<number, number> = { 1: 1, 2: 1.2, 4: 1.6, 8: 2.3 };
 const TINTS = ["", "#168e68", "#8c6eb4", "#be265c", "#b98a12", "#3b8ea5", "#7a5c45", "#5c5e66"];
 
 interface Companion {
@@ -187,7 +197,10 @@ export class WalkExhibit implements Exhibit {
   private companions = 1;
   private isHere = false;
   private sinceDrawn = 1;
+  private aside = 0;
   private replay: SavedWalk | null = null;
+  /** Whether the walk is to start anew once the gait is found. */
+  private awaited = false;
 
   constructor(private readonly app: App, readonly kind: Kind) {
     this.variety = VARIETIES[kind];
@@ -196,7 +209,7 @@ export class WalkExhibit implements Exhibit {
     this.subtitle = this.variety.subtitle;
     this.parameters = { ...this.variety.defaults };
     this.finder = new CycleFinder((cycle, parameters) => this.found(cycle, parameters));
-    this.lastGait = [0, 0.15, 0, -0.4, 0, 0];
+    this.lastGait = this.variety.guess;
     this.basin.onPick = (state) => this.start(state);
   }
 
@@ -216,15 +229,18 @@ export class WalkExhibit implements Exhibit {
     this.showParameters();
     this.app.stage.world.add(this.arrow.mesh);
     this.app.stage.floor.setLines(1, !this.parameters.slope_turns);
-    this.app.stage.setShadowReach(1.9);
-    if (this.kind === "steered" && !this.cycle) this.found(findCycle(this.app.kernel, this.parameters), this.parameters);
-    else this.seek();
+    this.app.stage.setScale(SCALES[this.companions]);
+    if (this.cycle) this.seek();
+    else this.found(this.soon(), this.parameters);
+    this.awaited = !this.cycle;
+    if (!this.cycle) this.seek();
     this.start();
     this.drawPlots();
   }
 
   leave(): void {
     this.isHere = false;
+    this.app.stage.setScale(1);
     this.basin.stop();
     this.arrow.mesh.removeFromParent();
     this.company.forEach(removeCompanion);
@@ -321,7 +337,7 @@ export class WalkExhibit implements Exhibit {
     companion.drawn = 0;
     const { foot_radius: radius } = current.parameters;
     const rolled = Math.min(radius * Math.abs(current.interLeg) * 1.15, 2 * halfArc(radius) * radius);
-    prints.add(current.contact, current.state[0], current.side, rolled, tint || undefined);
+    prints.add(this.apart(current).contact, current.state[0], current.side, rolled, tint || undefined);
     if (walk === this.company[0]?.walk) this.phase.add(current.side, walk.phase());
   }
 
@@ -352,18 +368,30 @@ export class WalkExhibit implements Exhibit {
   }
 
   private place(real: number, jump: boolean): void {
-    const p = this.walk.current.parameters;
     for (const companion of this.company) {
       const { walk, model, trail } = companion;
-      model.update(walk.current.parameters, shapeOf(walk.current.parameters, walk.pose()));
+      const drawn = this.drawn(walk.current.parameters);
+      model.update(drawn, shapeOf(drawn, this.apart(walk.pose())));
       const reached = Math.floor(walk.share * (PATH_POINTS - 1)) + 1;
       if (reached > companion.drawn) trail.extend(companion.path.slice(companion.drawn, reached));
       companion.drawn = Math.max(companion.drawn, reached);
     }
-    const shape = shapeOf(p, this.walk.pose());
-    const [x, , z] = shape.centre;
-    this.app.stage.follow(new THREE.Vector3(x, 0.5, z), this.walk.current.state[0], real, jump);
-    this.arrow.place(shape.centre, this.walk.current.state[0]);
+    const { centre } = shapeOf(this.drawn(this.walk.current.parameters), this.apart(this.walk.pose()));
+    // what is looked at goes along without swaying from foot to foot
+    const sway = jump ? 1 : 1 - Math.exp(-real / 0.4);
+    this.aside += sway * (centre[2] - this.aside);
+    this.app.stage.follow(new THREE.Vector3(centre[0], 0.5, this.aside), this.walk.current.state[0], real, jump);
+    this.arrow.place(centre, this.walk.current.state[0]);
+  }
+
+  private drawn(p: Parameters): Parameters {
+    return this.kind === "planar" ? { ...p, hip_width: DRAWN_WIDTH } : p;
+  }
+
+  private apart<Placed extends { contact: [number, number]; side: number }>(placed: Placed): Placed {
+    if (this.kind !== "planar") return placed;
+    const [x, z] = placed.contact;
+    return { ...placed, contact: [x, z - 0.5 * placed.side * DRAWN_WIDTH] };
   }
 
   private stepped(record: StepRecord): void {
@@ -438,12 +466,19 @@ export class WalkExhibit implements Exhibit {
     this.app.stage.floor.setLines(1, !this.parameters.slope_turns);
   }
 
+  /** The gait, if it is near the last one known: found at once. */
+  private soon(): Cycle | null {
+    const { kernel } = this.app;
+    return this.kind === "steered"
+      ? findCycle(kernel, this.parameters, this.lastGait)
+      : passiveCycleNear(kernel, this.parameters, this.kind === "planar", this.lastGait);
+  }
+
   private seek(): void {
     this.finder.ask(this.kind, this.parameters, this.lastGait);
   }
 
   private found(cycle: Cycle | null, parameters: Parameters): void {
-    const isFirst = this.cycle === null;
     this.cycle = cycle;
     if (cycle) this.lastGait = cycle.state;
     if (!this.isHere) return;
@@ -451,7 +486,10 @@ export class WalkExhibit implements Exhibit {
     this.returnMap.setCycle(cycle);
     this.basin.setCycle(this.kind, parameters, cycle);
     this.showFacts();
-    if (cycle && isFirst && this.company.length && this.kind !== "steered" && this.walk.records.length === 0) this.start();
+    if (cycle && this.awaited) {
+      this.awaited = false;
+      this.start();
+    }
   }
 
   private showFacts(): void {
@@ -509,27 +547,21 @@ export class WalkExhibit implements Exhibit {
       section("Phase plot", true, this.phase.element),
       section("Energy of each step", true, this.energyPanel.element),
       section("Basin of attraction", true, this.basin.element),
-      section("Take it with you", false, this.takeAway()),
     ].filter((node) => node !== null);
-  }
-
-  private takeAway(): HTMLElement {
-    const save = () => download("walk.csv", new Blob([this.table()], { type: "text/csv" }));
-    return h("div", { class: "row wrap" },
-      h("button", { type: "button", class: "small", id: `${this.id}-csv`, onclick: save }, "Steps as a table (CSV)"),
-      h("p", { class: "note" }, "A film of the stage is recorded with the buttons below the picture."));
   }
 
   private setCompany(n: number): void {
     this.companions = n;
+    this.app.stage.setScale(SCALES[n]);
     this.start();
   }
 
   private preset(change: Partial<Parameters>): void {
     this.change({ ...this.variety.defaults, ...change });
     this.replay = null;
-    const cycle = this.kind === "steered" ? findCycle(this.app.kernel, this.parameters, this.lastGait) : null;
+    const cycle = this.soon();
     if (cycle) this.found(cycle, this.parameters);
+    this.awaited = !cycle;
     this.start();
   }
 

@@ -93,10 +93,16 @@ function widened(kernel: Kernel, p: Parameters, start: State): State | null {
   return state;
 }
 
+/** The gait that Newton's method reaches from a state; null where it reaches none. */
+export function passiveCycleNear(kernel: Kernel, p: Parameters, planar: boolean, nearby: State): Cycle | null {
+  const state = fixedPoint(passiveMap(kernel, p, planar, 1), nearby);
+  return state && state[1] > LEAST_PITCH ? passiveCycleAt(kernel, p, planar, state) : null;
+}
+
 /** A passive walker's gait with its multipliers; null where none was found. */
 export function findPassiveCycle(kernel: Kernel, p: Parameters, planar: boolean, nearby: State | null = null): Cycle | null {
-  const close = nearby && fixedPoint(passiveMap(kernel, p, planar, 1), nearby);
-  if (close && close[1] > LEAST_PITCH) return passiveCycleAt(kernel, p, planar, close);
+  const close = nearby && passiveCycleNear(kernel, p, planar, nearby);
+  if (close) return close;
   const flat = planarGait(kernel, p);
   const state = flat && !planar && p.hip_width > 0 ? widened(kernel, p, flat) : flat;
   return state && passiveCycleAt(kernel, p, planar, state);

@@ -3,7 +3,7 @@
 import * as THREE from "three";
 import { PALETTE } from "./palette";
 
-const SIZE = 140;
+const SIZE = 240;
 
 export class Floor {
   private readonly plane: THREE.Mesh<THREE.PlaneGeometry, THREE.MeshStandardMaterial>;

@@ -17,7 +17,7 @@ const VIEWS: Record<Exclude<View, "free">, [number, number, number]> = {
 };
 const START: [number, number, number] = [1.6, 0.62, 2.25];
 const SHADOW_REACH = 1.9;
-const SETTLING_TIME = 0.35;
+const SETTLING_TIME = 0.5;
 
 /** What a slower machine does without: pixels for a CSS pixel at most, and the size of the shadow map (0: no shadow). */
 const QUALITIES = [
@@ -44,6 +44,7 @@ export class Stage {
   private tween: { from: THREE.Vector3; share: number } | null = null;
   private shift = new THREE.Vector2();
   private slowFrames = 0;
+  private scale = 1;
   quality = 0;
 
   constructor(readonly canvas: HTMLCanvasElement) {
@@ -87,12 +88,20 @@ export class Stage {
     this.scene.add(this.sun, this.sun.target);
   }
 
-  /** How far light casts shadows, for what is larger than a walker. */
-  setShadowReach(reach: number): void {
+  /** How much larger than a walker is what stands on the stage: distances of cameras, and the reach of shadows. */
+  setScale(scale: number): void {
     const { camera } = this.sun.shadow;
-    camera.left = camera.bottom = -reach;
-    camera.right = camera.top = reach;
+    camera.left = camera.bottom = -scale * SHADOW_REACH;
+    camera.right = camera.top = scale * SHADOW_REACH;
+    camera.far = 9 * scale;
     camera.updateProjectionMatrix();
+    const offset = this.offset().multiplyScalar(scale / this.scale);
+    this.scale = scale;
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.controls.minDistance = 0.5 * scale;
+    this.controls.maxDistance = 14 * scale;
+    (this.scene.fog as THREE.Fog).near = 5 * scale;
+    (this.scene.fog as THREE.Fog).far = 30 * scale;
   }
 
   setSlope(slope: number): void {
@@ -116,16 +125,12 @@ export class Stage {
     return this.camera.position.clone().sub(this.controls.target);
   }
 
-  resetCamera(): void {
-    this.camera.position.copy(this.controls.target).add(new THREE.Vector3(...START));
-  }
-
-  /** Follow a point of the floor's frame that moves with a heading; `jump` without delay. */
+  /** Follow a point of the floor's frame, and with some delay a heading; `jump`: without. */
   follow(point: THREE.Vector3Like, heading: number, duration: number, jump = false): void {
     const wanted = this.world.localToWorld(new THREE.Vector3(point.x, point.y, point.z));
     const share = jump ? 1 : 1 - Math.exp(-duration / SETTLING_TIME);
     const turn = (heading - this.heading) * share;
-    const moved = wanted.sub(this.target).multiplyScalar(share);
+    const moved = wanted.sub(this.target);
     this.heading += turn;
     this.target.add(moved);
     this.camera.position.add(moved);
@@ -136,7 +141,7 @@ export class Stage {
       this.tween.share = Math.min(this.tween.share + duration / 0.9, 1);
       const s = this.tween.share;
       const eased = s * s * (3 - 2 * s);
-      const goal = new THREE.Vector3(...VIEWS[this.view]).applyAxisAngle(new THREE.Vector3(0, 1, 0), this.heading);
+      const goal = new THREE.Vector3(...VIEWS[this.view]).multiplyScalar(this.scale).applyAxisAngle(new THREE.Vector3(0, 1, 0), this.heading);
       const length = THREE.MathUtils.lerp(this.tween.from.length(), goal.length(), eased);
       offset.copy(this.tween.from).lerp(goal, eased).setLength(length);
       if (s >= 1) this.tween = null;
@@ -178,7 +183,7 @@ export class Stage {
     this.controls.update();
     const { target } = this.controls;
     this.sun.target.position.copy(target).setY(target.y - 0.4);
-    this.sun.position.copy(this.sun.target.position).add(new THREE.Vector3(-1.7, 4.1, 2.3));
+    this.sun.position.copy(this.sun.target.position).add(new THREE.Vector3(-1.7, 4.1, 2.3).multiplyScalar(this.scale));
     this.floor.centre(this.world.worldToLocal(target.clone()));
     this.renderer.render(this.scene, this.camera);
   }

@@ -15,7 +15,7 @@ export interface Actions {
 }
 
 const RATES = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1, 2];
-const VIEWS: [View, string][] = [["free", "free camera"], ["follow", "follow"], ["side", "from the side"], ["behind", "from behind"], ["above", "from above"]];
+const VIEWS: [View, string][] = [["free", "free view"], ["follow", "follow"], ["side", "side"], ["behind", "behind"], ["above", "above"]];
 
 const ICONS = {
   play: '<path d="M7 5.5v13l11-6.5z"/>',
