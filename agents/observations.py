@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,10 +35,15 @@ class ObservationLayout:
     scales: tuple[float, ...]
 
     @classmethod
-    def of(cls, task: str, options: EnvOptions) -> ObservationLayout:
-        """The layout of a task's observations under these options."""
+    def of(cls, task: str, options: EnvOptions, needs: Iterable[str] = ()) -> ObservationLayout:
+        """The layout of a task's observations under these options, or ``ValueError`` if it lacks a name that is needed."""
         made = task_named(task)
         names = options.observation_names(made)
+        for name in needs:
+            if name not in names:
+                raise ValueError(
+                    f"task must be one that shows {name}, got {task!r}, which shows {', '.join(names)}"
+                )
         centres = _CENTRES | {feature.name: feature.centre for feature in made.features}
         scales = _SCALES | {feature.name: feature.scale for feature in made.features}
         return cls(
@@ -51,7 +57,7 @@ class ObservationLayout:
         array = np.asarray(observation, dtype=np.float32)
         if array.ndim == 0 or array.shape[-1] != len(self.names):
             raise ValueError(
-                f"observation must have shape (..., {len(self.names)}): {', '.join(self.names)}; not {array.shape}"
+                f"observation must have shape (..., {len(self.names)}) of {', '.join(self.names)}, got {array.shape}"
             )
         return array
 

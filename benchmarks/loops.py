@@ -63,7 +63,7 @@ def strike(time, y, body, command, heading, side, outcome):
     stance = stance_of(body_of(body), Command(command[0], command[1], command[2]), heading, side)
     sin_a, cos_a = sine_cosine(y[0] + stance.tilt)
     sin_twist, cos_twist = sine_cosine(y[1])
-    z, q, dq = middle_of_masses(stance, sin_twist, cos_twist, stance.offset_before)
+    z, q, dq = middle_of_masses(stance, sin_twist, cos_twist, stance.previous_offset)
     _, _, m11, m12, m22 = mass_matrix(stance, sin_a, cos_a, sin_twist, z, q, dq)
     energy = kinetic_energy(m11, m12, m22, y[2], y[3])
     flight = Flight(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,54 +11,105 @@ from numpy.typing import ArrayLike, NDArray
 from lean_yaw_env.errors import SolverError
 from lean_yaw_env.kernel import records
 from lean_yaw_env.kernel.batch import step_batch as step_batch_kernel
+from lean_yaw_env.kernel.bounds import count_outside
 from lean_yaw_env.kernel.records import Body, Command, Outcome
 from lean_yaw_env.parameters import (
+    COMMAND_RANGES,
     INTER_LEG_ANGLE,
-    QUARTER_TURN,
+    PARAMETER_RANGES,
+    STATE_RANGES,
     STATE_SIZE,
+    Range,
     Vector,
     WalkerParameters,
-    require_number,
 )
-from lean_yaw_env.threads import share_out
+from lean_yaw_env.threads import MOST_THREADS, share_out
+from lean_yaw_env.validation import require_count, require_one_or_each, require_shape
+
+_REPEATS = 64  # of a row's ranges: the compiled check goes through so many rows at a time
+
+
+class _Limits:
+    """The ranges of a row's columns, as the compiled check takes them."""
+
+    def __init__(self, ranges: Sequence[Range]) -> None:
+        self._ranges = ranges
+        # an end that does not belong to its range: the next number inside takes its place
+        low = [r.low if r.bounds[0] == "[" else math.nextafter(r.low, math.inf) for r in ranges]
+        high = [r.high if r.bounds[1] == "]" else math.nextafter(r.high, -math.inf) for r in ranges]
+        self._low, self._high = np.tile(low, _REPEATS), np.tile(high, _REPEATS)
+
+    def check(self, rows: Vector, name: str) -> None:
+        """Raise ``ValueError`` for the first number of ``rows`` (n, k) outside its column's range; ``name`` with its row and column."""
+        if not count_outside(rows.ravel(), self._low, self._high):
+            return
+        k = len(self._ranges)
+        inside = (rows >= self._low[:k]) & (rows <= self._high[:k])
+        row, column = (int(place[0]) for place in np.nonzero(~inside))
+        limits = self._ranges[column]
+        limits.require(float(rows[row, column]), name.format(row=row, column=limits.name))
+
+
+_STATE_LIMITS = _Limits(STATE_RANGES)
+_COMMAND_LIMITS = _Limits(COMMAND_RANGES)
+_BODY_LIMITS = _Limits(
+    (*PARAMETER_RANGES, Range("slope_turns", 0.0, 1.0), Range("strike_at_start", 0.0, 1.0))
+)
 
 
 class BatchResult:
-    """The outcomes of a batch: one attribute for each field of ``kernel.records.Outcome``, each of shape (n,).
+    """The outcomes of a batch of ``n`` steps; every attribute holds a row for each walker.
 
     Attributes
     ----------
-    states : shape (n, 5)
-    statuses : shape (n,)
-        ``kernel.records.STEPPED`` or a way to fall.
-    stepped : shape (n,), bool
     outcomes : shape (n, 18)
-        All fields, in order.
+        All fields of ``kernel.records.Outcome``, in order; each is an attribute of shape (n,) too.
+    states : shape (n, 5)
+        Section states just after the heel strikes, or where the walkers were when they fell.
+    stepped : shape (n,), bool
+        Whether each walker completed its step: its ``status`` is ``kernel.records.STEPPED`` and not a way to fall.
     """
+
+    heading: Vector
+    stance_pitch: Vector
+    ankle_angle: Vector
+    stance_pitch_rate: Vector
+    ankle_rate: Vector
+    status: Vector
+    duration: Vector
+    displacement_x: Vector
+    displacement_z: Vector
+    heading_change: Vector
+    mass_offset: Vector
+    least_normal_force: Vector
+    greatest_friction: Vector
+    gravity_work: Vector
+    shift_work: Vector
+    impact_loss: Vector
+    ankle_loss: Vector
+    evaluations: Vector
 
     def __init__(self, outcomes: Vector) -> None:
         self.outcomes = outcomes
+        for name, column in zip(Outcome._fields, outcomes.T, strict=True):
+            setattr(self, name, column)
         self.states = outcomes[:, :STATE_SIZE]
-        self.statuses = outcomes[:, Outcome._fields.index("status")]
-        self.stepped: NDArray[np.bool_] = self.statuses == records.STEPPED
-
-    def __getattr__(self, name: str) -> Vector:
-        if name not in Outcome._fields:
-            raise AttributeError(f"BatchResult has no attribute {name!r}")
-        return self.outcomes[:, Outcome._fields.index(name)]
+        self.stepped: NDArray[np.bool_] = self.status == records.STEPPED
 
 
 def bodies_of(parameters: WalkerParameters | Sequence[WalkerParameters] | Vector) -> Vector:
-    """Parameters as rows (1 or n, 11) of ``kernel.records.Body``; an array of such rows is passed through."""
+    """Parameters as rows (1 or n, 11) of ``kernel.records.Body``; an array of such rows is checked and passed through."""
     if isinstance(parameters, WalkerParameters):
         return np.array([parameters.body()])
-    if isinstance(parameters, np.ndarray):
-        if parameters.ndim != 2 or parameters.shape[1] != len(Body._fields):
-            raise ValueError(
-                f"parameters must have shape (n, {len(Body._fields)}), not {parameters.shape}"
-            )
-        return np.ascontiguousarray(parameters, dtype=float)
-    return np.array([each.body() for each in parameters])
+    if not isinstance(parameters, np.ndarray):
+        walkers = list(parameters) if isinstance(parameters, Sequence) else [parameters]
+        for i, walker in enumerate(walkers):
+            if not isinstance(walker, WalkerParameters):
+                raise ValueError(f"parameters[{i}] must be WalkerParameters, got {walker!r}")
+        return np.array([walker.body() for walker in walkers])
+    rows = require_shape("parameters", parameters, (None, len(Body._fields)))
+    _BODY_LIMITS.check(rows, "parameters[{row}]: {column}")
+    return rows
 
 
 def step_batch(
@@ -86,53 +138,37 @@ def step_batch(
     Raises
     ------
     ValueError
-        If a shape does not fit, or a number is outside its range.
+        If a shape does not fit, or a number is outside its range, which is that of ``Walker.step``.
     SolverError
         If the integrator gives up on a walker; never for a fall.
     """
-    start = np.ascontiguousarray(states, dtype=float)
-    if start.ndim != 2 or start.shape[1] != STATE_SIZE:
-        raise ValueError(f"states must have shape (n, {STATE_SIZE}), not {start.shape}")
+    start = require_shape("states", states, (None, STATE_SIZE))
+    _STATE_LIMITS.check(start, "states[{row}]: {column}")
     n = len(start)
-    if not np.isfinite(start).all() or not (np.abs(start[:, 1:3]) < QUARTER_TURN).all():
-        raise ValueError(
-            "states must be finite, with stance pitch and ankle angle within a quarter turn"
-        )
-    side = _column("sides", sides, n)
-    if not (np.abs(side) == 1.0).all():
-        raise ValueError("sides must be +1 (left) or -1 (right)")
+    side = np.ascontiguousarray(require_one_or_each("sides", sides, n))
+    other = np.abs(side) != 1.0
+    if other.any():
+        raise ValueError(f"sides must be +1 (left) or -1 (right), got {side[other][0]}")
     commands = np.empty((n, len(Command._fields)))
-    commands[:, 0] = _column("inter_leg_angles", inter_leg_angles, n, 0.0, QUARTER_TURN)
-    commands[:, 1] = _column("mass_offsets", mass_offsets, n, -1.0, 1.0)
     before = mass_offsets if previous_offsets is None else previous_offsets
-    commands[:, 2] = _column("previous_offsets", before, n, -1.0, 1.0)
+    commands[:, 0] = require_one_or_each("inter_leg_angles", inter_leg_angles, n)
+    commands[:, 1] = require_one_or_each("mass_offsets", mass_offsets, n)
+    commands[:, 2] = require_one_or_each("previous_offsets", before, n)
+    _COMMAND_LIMITS.check(commands, "{column}s[{row}]")
     bodies = bodies_of(parameters)
     if len(bodies) not in (1, n):
-        raise ValueError(f"parameters must be one or {n} walkers', not {len(bodies)}")
+        raise ValueError(f"parameters must be of one or {n} walkers, got {len(bodies)}")
+    workers = require_count("threads", threads, 1, MOST_THREADS)
     outcomes = np.empty((n, len(Outcome._fields)))
-    workers = int(require_number("threads", threads, 1, 1024))
     share_out(
         lambda first, last: step_batch_kernel(bodies, commands, start, side, outcomes, first, last),
         n,
         workers,
     )
     result = BatchResult(outcomes)
-    failed = np.flatnonzero(result.statuses == records.FAILED)
+    failed = np.flatnonzero(result.status == records.FAILED)
     if len(failed):
         raise SolverError(
             f"the step of walker {failed[0]} from {start[failed[0]].tolist()} did not converge"
         )
     return result
-
-
-def _column(
-    name: str, value: ArrayLike, n: int, low: float = -np.inf, high: float = np.inf
-) -> Vector:
-    array = np.asarray(value, dtype=float)
-    if array.shape not in ((), (n,)):
-        raise ValueError(f"{name} must be a number or have shape ({n},), not {array.shape}")
-    if not ((array >= low) & (array <= high)).all():
-        raise ValueError(
-            f"{name} must be in [{low:g}, {high:g}], not {array[~((array >= low) & (array <= high))].flat[0] if array.ndim else array}"
-        )
-    return np.ascontiguousarray(np.broadcast_to(array, (n,)))

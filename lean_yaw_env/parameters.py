@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.kernel.records import Body
-from lean_yaw_env.validation import require_array, require_choice, require_flag, require_number
+from lean_yaw_env.validation import require_choice, require_flag, require_number, require_shape
 
 Foot = Literal["left", "right"]
 FEET: tuple[Foot, Foot] = ("left", "right")
@@ -53,6 +53,49 @@ MIRROR = np.array([-1.0, 1.0, -1.0, 1.0, -1.0])
 MIRROR.flags.writeable = False
 
 QUARTER_TURN = 0.5 * math.pi
+
+
+class Range(NamedTuple):
+    """The interval in which a number must be; ``bounds`` are its brackets, "[" and "]" where the end belongs to it."""
+
+    name: str
+    low: float
+    high: float
+    bounds: str = "[]"
+
+    def require(self, value: Any, name: str | None = None) -> float:
+        """Return a number of the interval as float, or raise ``ValueError``, which calls it ``name``."""
+        return require_number(name or self.name, value, self.low, self.high, self.bounds)
+
+
+STATE_RANGES = (
+    Range("heading", -1e6, 1e6, "()"),
+    Range("stance_pitch", -QUARTER_TURN, QUARTER_TURN, "()"),
+    Range("ankle_angle", -QUARTER_TURN, QUARTER_TURN, "()"),
+    Range("stance_pitch_rate", -1e6, 1e6, "()"),
+    Range("ankle_rate", -1e6, 1e6, "()"),
+)
+"""Of a section state's coordinates, in order. Faster than a million is no walker; the ankle of a leg on the floor stays within a quarter turn."""
+
+COMMAND_RANGES = (
+    Range("inter_leg_angle", 0.0, QUARTER_TURN, "()"),
+    Range("mass_offset", -1.0, 1.0),
+    Range("previous_offset", -1.0, 1.0),
+)
+"""Of what is commanded for a step, in the order of ``kernel.records.Command``."""
+
+PARAMETER_RANGES = (
+    Range("hip_width", 0.0, 2.0),
+    Range("foot_radius", 0.0, 1.0, "[)"),
+    Range("ankle_tilt", 0.0, QUARTER_TURN, "(]"),
+    Range("slope", -0.5, 0.5),
+    Range("ankle_stiffness", 0.0, 100.0),
+    Range("ankle_damping", 0.0, 100.0),
+    Range("shift_time", 0.01, 10.0),
+    Range("friction_limit", 0.0, math.inf, "(]"),
+    Range("max_step_duration", 0.0, 100.0, "(]"),
+)
+"""Of a walker's parameters that are numbers, in the order of ``kernel.records.Body``, whose last two fields are 0 or 1."""
 
 
 @dataclass(frozen=True)
@@ -103,9 +146,8 @@ class WalkerParameters:
     max_step_duration: float = 10.0
 
     def __post_init__(self) -> None:
-        for name, low, high, bounds in _RANGES:
-            value = require_number(name, getattr(self, name), low, high, bounds)
-            object.__setattr__(self, name, value)
+        for limits in PARAMETER_RANGES:
+            object.__setattr__(self, limits.name, limits.require(getattr(self, limits.name)))
         require_flag("slope_turns", self.slope_turns)
         require_choice("early_contact", self.early_contact, ("trip", "strike"))
 
@@ -126,29 +168,15 @@ class WalkerParameters:
         )
 
 
-_RANGES = (
-    ("hip_width", 0.0, 2.0, "[]"),
-    ("foot_radius", 0.0, 1.0, "[)"),
-    ("ankle_tilt", 0.0, QUARTER_TURN, "(]"),
-    ("slope", -0.5, 0.5, "[]"),
-    ("ankle_stiffness", 0.0, 100.0, "[]"),
-    ("ankle_damping", 0.0, 100.0, "[]"),
-    ("shift_time", 0.01, 10.0, "[]"),
-    ("friction_limit", 0.0, math.inf, "(]"),
-    ("max_step_duration", 0.0, 100.0, "(]"),
-)
 PARAMETER_NAMES = tuple(field.name for field in fields(WalkerParameters))
 
 
 def require_state(state: ArrayLike | Sequence[float], name: str = "state") -> Vector:
     """Return a section state as float array of shape (5,), or raise ``ValueError`` naming the coordinate and its range."""
-    array = require_array(name, state, (STATE_SIZE,), -math.inf, math.inf, "[]")
-    for field, value in zip(STATE_FIELDS, array, strict=True):
-        bound = QUARTER_TURN if field.name in ("stance_pitch", "ankle_angle") else 1e6
-        if not abs(value) < bound:
-            raise ValueError(
-                f"{name}: {field.name} must be in ({-bound:g}, {bound:g}), got {value}"
-            )
+    array = require_shape(name, state, (STATE_SIZE,)).copy()
+    for limits, value in zip(STATE_RANGES, array.tolist(), strict=True):
+        if not limits.low < value < limits.high:
+            limits.require(value, f"{name}: {limits.name}")
     return array
 
 
@@ -159,9 +187,9 @@ def require_foot(stance: Any) -> Foot:
 
 def require_inter_leg_angle(value: Any) -> float:
     """Return the swing leg's angle in front of the stance leg, (0, pi/2), or raise ``ValueError``."""
-    return require_number("inter_leg_angle", value, 0.0, QUARTER_TURN, "()")
+    return COMMAND_RANGES[0].require(value)
 
 
 def require_mass_offset(value: Any, name: str = "mass_offset") -> float:
     """Return the masses' sideways offset along the axle, [-1, 1] leg lengths, or raise ``ValueError``."""
-    return require_number(name, value, -1.0, 1.0)
+    return COMMAND_RANGES[1].require(value, name)

@@ -14,14 +14,15 @@ from lean_yaw_env.parameters import (
     MIRROR,
     QUARTER_TURN,
     STATE_FIELDS,
+    STATE_SIZE,
     Foot,
     StateField,
     Vector,
     WalkerParameters,
     require_foot,
-    require_number,
     require_state,
 )
+from lean_yaw_env.validation import require_count, require_flag, require_number, require_shape
 from lean_yaw_env.walker import OTHER_FOOT, SIDE, raise_for_failure
 
 PASSIVE_STATE_FIELDS = (
@@ -97,7 +98,7 @@ class PassiveStep:
     displacement : shape (2,)
         Between contact reference points: downhill (x) and to the right (z), leg lengths.
     fall : PassiveFall or None
-    normal_force, friction_demand : float
+    least_normal_force, greatest_friction : float
         Least normal force (in weights) and greatest tangential over normal force.
     gravity_work, impact_loss, ankle_loss : float
         Energy given by gravity, lost at heel strike and in the ankle, in weight times leg length.
@@ -111,8 +112,8 @@ class PassiveStep:
     displacement: Vector
     heading_change: float
     fall: PassiveFall | None
-    normal_force: float
-    friction_demand: float
+    least_normal_force: float
+    greatest_friction: float
     gravity_work: float
     impact_loss: float
     ankle_loss: float
@@ -165,9 +166,8 @@ class PassiveWalker:
 
     def __post_init__(self) -> None:
         if not isinstance(self.parameters, WalkerParameters):
-            raise ValueError(f"parameters must be WalkerParameters, not {self.parameters!r}")
-        if not isinstance(self.planar, (bool, np.bool_)):
-            raise ValueError(f"planar must be True or False, not {self.planar!r}")
+            raise ValueError(f"parameters must be WalkerParameters, got {self.parameters!r}")
+        require_flag("planar", self.planar)
 
     @property
     def moving_parameters(self) -> WalkerParameters:
@@ -212,13 +212,13 @@ class PassiveWalker:
         ValueError, SolverError
             As ``step``.
         """
-        require_number("n_steps", n_steps, 1, 10_000_000)
+        n_steps = require_count("n_steps", n_steps)
         result = None
         current, foot = require_passive_state(state, planar=self.planar), require_foot(stance)
         states, angles, footprints, durations = [current], [], [np.zeros(2)], []
         stances: list[Foot] = [foot]
         angle: float | None = None
-        for _ in range(int(n_steps)):
+        for _ in range(n_steps):
             result = self.step(current, stance=foot, inter_leg_angle=angle)
             angles.append(result.start_inter_leg_angle)
             if result.fall is not None:
@@ -270,17 +270,17 @@ class PassiveWalker:
         ValueError
             If an argument is outside its range.
         """
-        require_number("duration", duration, 0.0, 100.0, "(]")
-        require_number("samples", samples, 2, 1_000_000)
+        duration = require_number("duration", duration, 0.0, 100.0, "(]")
+        samples = require_count("samples", samples, 2, 1_000_000)
         start = require_passive_state(state, planar=self.planar)
         first = self.step(start, stance=stance, inter_leg_angle=inter_leg_angle)
-        rows = np.zeros((int(samples), len(MOTION_COLUMNS)))
+        rows = np.zeros((samples, len(MOTION_COLUMNS)))
         passive_trace(
             self.moving_parameters.body(),
             start,
             first.start_inter_leg_angle,
             SIDE[require_foot(stance)],
-            float(duration),
+            duration,
             rows,
         )
         return {name: rows[:, i].copy() for i, name in enumerate(MOTION_COLUMNS)}
@@ -288,22 +288,13 @@ class PassiveWalker:
 
 def require_passive_state(state: ArrayLike, *, planar: bool = False, name: str = "state") -> Vector:
     """Return a passive section state as float array (6,), or raise ``ValueError``."""
-    try:
-        array = np.array(state, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must hold {PASSIVE_STATE_SIZE} numbers, not {state!r}") from error
-    if array.shape != (PASSIVE_STATE_SIZE,):
-        names = ", ".join(field.name for field in PASSIVE_STATE_FIELDS)
-        raise ValueError(
-            f"{name} must have shape ({PASSIVE_STATE_SIZE},): {names}; not {array.shape}"
-        )
-    require_state(array[:5], name)
-    if not abs(array[5]) < 1e6:
-        raise ValueError(f"{name}: inter_leg_rate must be in (-1e+06, 1e+06), not {array[5]}")
+    array = require_shape(name, state, (PASSIVE_STATE_SIZE,)).copy()
+    require_state(array[:STATE_SIZE], name)
+    require_number(f"{name}: inter_leg_rate", float(array[STATE_SIZE]), -1e6, 1e6, "()")
     if planar and np.any(array[[0, 2, 4]] != 0.0):
         raise ValueError(
             f"{name}: a planar walker's heading, ankle_angle and ankle_rate must be 0, "
-            f"not {array[[0, 2, 4]].tolist()}"
+            f"got {array[[0, 2, 4]].tolist()}"
         )
     return array
 
@@ -361,8 +352,8 @@ def _result(
         displacement=np.array([outcome.displacement_x, outcome.displacement_z]),
         heading_change=outcome.heading_change,
         fall=fall,
-        normal_force=outcome.least_normal_force,
-        friction_demand=outcome.greatest_friction,
+        least_normal_force=outcome.least_normal_force,
+        greatest_friction=outcome.greatest_friction,
         gravity_work=outcome.gravity_work,
         impact_loss=outcome.impact_loss,
         ankle_loss=outcome.ankle_loss,

@@ -11,6 +11,7 @@ from typing import TypeVar
 
 Result = TypeVar("Result")
 
+MOST_THREADS = 1024
 # Below this many walkers a thread costs more than it takes over.
 SMALLEST_SHARE = 256
 # How many walkers are stepped while a helper wakes up and reports back, some 50 us: the caller's share is larger by so many.

@@ -20,14 +20,12 @@ _NUMBERS = (int, float, np.integer, np.floating)
 
 def require_number(name: str, value: Any, low: float, high: float, bounds: str = "[]") -> float:
     """Return a real number of an interval as float; ``bounds`` are its brackets, "[" and "]" where the end belongs to it."""
-    allowed = f"{bounds[0]}{low:g}, {high:g}{bounds[1]}"
     if isinstance(value, bool) or not isinstance(value, _NUMBERS):
-        raise ValueError(f"{name} must be a number in {allowed}, got {value!r}")
+        raise ValueError(f"{name} must be {_number_in(low, high, bounds)}, got {value!r}")
     number = float(value)
-    above = number > low or (bounds[0] == "[" and number == low)
-    below = number < high or (bounds[1] == "]" and number == high)
-    if not (above and below):
-        raise ValueError(f"{name} must be in {allowed}, got {value!r}")
+    if not _is_inside(number, low, high, bounds):
+        allowed = _number_in(low, high, bounds).removeprefix("a number ")
+        raise ValueError(f"{name} must be {allowed}, got {value!r}")
     return number
 
 
@@ -77,23 +75,72 @@ def require_array(
     bounds: str = "()",
 ) -> NDArray[np.float64]:
     """Return numbers of an interval, by default all finite ones, as a new float array of ``shape``; None there stands for any length."""
-    wanted = f"({', '.join('n' if n is None else str(n) for n in shape)}{',' if len(shape) == 1 else ''})"
-    allowed = f"{bounds[0]}{low:g}, {high:g}{bounds[1]}"
+    array = np.array(require_shape(name, value, shape))
+    inside = _is_inside(array, low, high, bounds)
+    if not np.all(inside):
+        allowed = _number_in(low, high, bounds).removeprefix("a ").replace("number", "numbers")
+        raise ValueError(f"{name} must hold {allowed}, got {array[~inside].flat[0]}")
+    return array
+
+
+def require_vector(
+    name: str, value: ArrayLike, low: float = -math.inf, high: float = math.inf, bounds: str = "()"
+) -> NDArray[np.float64]:
+    """Return a number, or a sequence of one or more, as a new float array of shape (n,)."""
+    given: Any = [value] if isinstance(value, _NUMBERS) else value
+    vector = require_array(name, given, (None,), low, high, bounds)
+    if not vector.size:
+        raise ValueError(f"{name} must hold one number or more, got none")
+    return vector
+
+
+def require_shape(
+    name: str, value: ArrayLike, shape: tuple[int | None, ...]
+) -> NDArray[np.float64]:
+    """Return real numbers, NaN included, as a float array of ``shape``, the given one where it fits; None there stands for any length."""
     try:
         given = np.asarray(value)
     except ValueError as error:
-        raise ValueError(f"{name} must hold numbers in shape {wanted}, got {value!r}") from error
+        raise ValueError(_must_hold_numbers(name, value, shape)) from error
     if given.dtype.kind not in "iuf":
-        raise ValueError(f"{name} must hold numbers in shape {wanted}, got {value!r}")
-    fits = given.ndim == len(shape) and all(
-        n is None or n == m for n, m in zip(shape, given.shape, strict=True)
-    )
+        raise ValueError(_must_hold_numbers(name, value, shape))
+    fits = len(shape) == given.ndim and all(map(_fits, shape, given.shape))
     if not fits:
-        raise ValueError(f"{name} must have shape {wanted}, got {given.shape}")
-    array = np.array(given, dtype=np.float64, order="C")
-    above = array >= low if bounds[0] == "[" else array > low
-    below = array <= high if bounds[1] == "]" else array < high
-    inside = above & below
-    if not inside.all():
-        raise ValueError(f"{name} must hold numbers in {allowed}, got {array[~inside].flat[0]}")
-    return array
+        raise ValueError(f"{name} must have shape {_written(shape)}, got {given.shape}")
+    return np.asarray(given, dtype=np.float64, order="C")
+
+
+def require_one_or_each(name: str, value: ArrayLike, n: int) -> NDArray[np.float64]:
+    """Return one real number, or one for each of ``n``, NaN included, as a float array (n,) that may be read only."""
+    if np.isscalar(value) or value is None or getattr(value, "shape", None) == ():
+        return np.broadcast_to(require_shape(name, value, ()), (n,))
+    given = require_shape(name, value, (None,))
+    if len(given) != n:
+        raise ValueError(f"{name} must be one number or {n} of them, got {len(given)}")
+    return given
+
+
+def _fits(wanted: int | None, length: int) -> bool:
+    return wanted is None or wanted == length
+
+
+def _must_hold_numbers(name: str, value: Any, shape: tuple[int | None, ...]) -> str:
+    kind = f"hold numbers in shape {_written(shape)}" if shape else "be a number"
+    return f"{name} must {kind}, got {value!r}"
+
+
+def _written(shape: tuple[int | None, ...]) -> str:
+    """A shape as NumPy writes it, with n for any length."""
+    return str(shape).replace("None", "n")
+
+
+def _number_in(low: float, high: float, bounds: str) -> str:
+    if (low, high, bounds) == (-math.inf, math.inf, "()"):
+        return "a finite number"
+    return f"a number in {bounds[0]}{low:g}, {high:g}{bounds[1]}"
+
+
+def _is_inside(number: Any, low: float, high: float, bounds: str) -> Any:
+    """Whether a number, or each of an array, is in an interval; NaN is in none."""
+    above = number >= low if bounds[0] == "[" else number > low
+    return above & (number <= high if bounds[1] == "]" else number < high)

@@ -24,9 +24,9 @@ from lean_yaw_env.parameters import (
     require_foot,
     require_inter_leg_angle,
     require_mass_offset,
-    require_number,
     require_state,
 )
+from lean_yaw_env.validation import require_count, require_number, require_one_or_each
 
 SIDE: dict[Foot, float] = {"left": 1.0, "right": -1.0}
 OTHER_FOOT: dict[Foot, Foot] = {"left": "right", "right": "left"}
@@ -96,7 +96,7 @@ class StepResult:
     mass_offset : float
         Offset in force at the end; a heel strike in mid-shift locks the masses where they are.
     fall : Fall or None
-    normal_force, friction_demand : float
+    least_normal_force, greatest_friction : float
         Least normal force (in weights) and greatest ratio of tangential to normal force, among the instants at which the integrator looked.
     energy : EnergyLedger
     evaluations : int
@@ -110,8 +110,8 @@ class StepResult:
     heading_change: float
     mass_offset: float
     fall: Fall | None
-    normal_force: float
-    friction_demand: float
+    least_normal_force: float
+    greatest_friction: float
     energy: EnergyLedger
     evaluations: int
 
@@ -169,7 +169,7 @@ class Walker:
 
     def __post_init__(self) -> None:
         if not isinstance(self.parameters, WalkerParameters):
-            raise ValueError(f"parameters must be WalkerParameters, not {self.parameters!r}")
+            raise ValueError(f"parameters must be WalkerParameters, got {self.parameters!r}")
 
     def step(
         self,
@@ -235,15 +235,16 @@ class Walker:
         ValueError, SolverError
             As ``step``.
         """
-        require_number("n_steps", n_steps, 1, 10_000_000)
-        if samples_per_step != 0:
-            require_number("samples_per_step", samples_per_step, 2, 10_000)
+        n_steps = require_count("n_steps", n_steps)
+        samples = require_count("samples_per_step", samples_per_step, 0, 10_000)
+        if samples == 1:
+            raise ValueError("samples_per_step must be 0 or from 2 to 10000, got 1")
         foot = require_foot(stance)
         current = require_state(state)
-        angles = _per_step("inter_leg_angle", inter_leg_angle, n_steps)
-        offsets = _per_step("mass_offset", mass_offset, n_steps)
+        angles = require_one_or_each("inter_leg_angle", inter_leg_angle, n_steps).tolist()
+        offsets = require_one_or_each("mass_offset", mass_offset, n_steps).tolist()
         commands = [require_command(a, m, None) for a, m in zip(angles, offsets, strict=True)]
-        before = require_command(angles[0], offsets[0], previous_offset).offset_before
+        before = require_command(angles[0], offsets[0], previous_offset).previous_offset
 
         states, footprints = [current], [np.zeros(2)]
         stances: list[Foot] = [foot]
@@ -251,10 +252,10 @@ class Walker:
         in_force, energies, path = [before], [], []
         fall = None
         for command in commands:
-            moved = command._replace(offset_before=in_force[-1])
+            moved = command._replace(previous_offset=in_force[-1])
             result = self._step(current, foot, moved)
-            if samples_per_step:
-                rows = self._trace(current, foot, moved, result.duration, samples_per_step)
+            if samples:
+                rows = self._trace(current, foot, moved, result.duration, samples)
                 path.append(_centre_path(rows, current[0], footprints[-1], sum(durations)))
             if result.fall is not None:
                 fall = result.fall
@@ -307,12 +308,10 @@ class Walker:
         ValueError
             If an argument is outside its range.
         """
-        require_number("duration", duration, 0.0, 100.0, "(]")
-        require_number("samples", samples, 2, 1_000_000)
+        duration = require_number("duration", duration, 0.0, 100.0, "(]")
+        samples = require_count("samples", samples, 2, 1_000_000)
         command = require_command(inter_leg_angle, mass_offset, previous_offset)
-        rows = self._trace(
-            require_state(state), require_foot(stance), command, float(duration), int(samples)
-        )
+        rows = self._trace(require_state(state), require_foot(stance), command, duration, samples)
         return {name: rows[:, i].copy() for i, name in enumerate(COLUMNS)}
 
     @cached_property
@@ -370,24 +369,15 @@ def _result(
         duration=outcome.duration,
         displacement=np.array([outcome.displacement_x, outcome.displacement_z]),
         heading_change=outcome.heading_change,
-        mass_offset=outcome.offset,
+        mass_offset=outcome.mass_offset,
         fall=fall,
-        normal_force=outcome.least_normal_force,
-        friction_demand=outcome.greatest_friction,
+        least_normal_force=outcome.least_normal_force,
+        greatest_friction=outcome.greatest_friction,
         energy=EnergyLedger(
             outcome.gravity_work, outcome.shift_work, outcome.impact_loss, outcome.ankle_loss
         ),
         evaluations=int(outcome.evaluations),
     )
-
-
-def _per_step(name: str, value: float | Sequence[float] | Vector, n_steps: int) -> list[float]:
-    array = np.asarray(value, dtype=float)
-    if array.ndim == 0:
-        return [float(array)] * n_steps
-    if array.shape != (n_steps,):
-        raise ValueError(f"{name} must be one number or {n_steps} of them, not shape {array.shape}")
-    return array.tolist()
 
 
 def _centre_path(rows: Vector, heading: float, footprint: Vector, time: float) -> Vector:

@@ -12,15 +12,15 @@ import torch
 from agents import load, save
 from agents.controllers.simple import FixedController
 from agents.evaluation.scoring import run_seeds
-from agents.learning.checkpoint import CheckpointError
+from agents.learning.algorithms import settings_for, train
 from agents.learning.gradient import walkers as walkers_module
 from agents.learning.gradient.differentiation import bounded
+from agents.learning.gradient.learner import GradientSettings
 from agents.learning.gradient.networks import make_policy
 from agents.learning.gradient.returns import Window, time_discounted_returns
-from agents.learning.gradient.settings import GradientSettings, settings_for
 from agents.learning.gradient.tasks import FORMULAS
-from agents.learning.gradient.training import train_gradient
 from agents.learning.gradient.walkers import DifferentiableWalkers
+from agents.learning.recorder import CheckpointError
 from agents.seeds import TUNING_SEEDS
 from lean_yaw_env.envs.options import EnvOptions, gait_of
 from lean_yaw_env.kernel.batch import step_batch
@@ -28,7 +28,7 @@ from lean_yaw_env.kernel.jacobian import INPUTS, OUTPUTS
 from lean_yaw_env.kernel.jacobians import step_jacobians
 from lean_yaw_env.kernel.records import STEPPED, Outcome
 from lean_yaw_env.parameters import WalkerParameters
-from lean_yaw_env.registration import ENV_IDS
+from lean_yaw_env.registration import TASK_VERSIONS
 
 ID = "LeanYaw/Heading-v0"
 TINY = GradientSettings(
@@ -261,14 +261,14 @@ def test_nothing_is_earned_after_a_fall_and_the_critic_s_value_after_a_time_limi
 
 
 def trained(**changes):
-    return train_gradient(ID, replace(TINY, **changes), options=SHORT, progress=False)
+    return train("apg", ID, replace(TINY, **changes), options=SHORT, progress=False)
 
 
 def test_a_short_training_steers_better_than_the_fixed_controller():
     settings = GradientSettings(
         steps=24_000, walkers=32, window=32, critic_first=6_000, hidden=(32, 32)
     )
-    policy = train_gradient(ID, settings, seed=1, progress=False).policy
+    policy = train("apg", ID, settings, seed=1, progress=False).policy
     seeds = range(TUNING_SEEDS, TUNING_SEEDS + 48)
     errors = [
         run_seeds(agent, "Heading", seeds).metrics["mean_absolute_heading_error"].mean()
@@ -279,7 +279,7 @@ def test_a_short_training_steers_better_than_the_fixed_controller():
 
 
 def test_training_is_decided_by_its_seed():
-    first, again, other = trained(), trained(), train_gradient(ID, TINY, seed=1, options=SHORT, progress=False)  # fmt: skip
+    first, again, other = trained(), trained(), train("apg", ID, TINY, seed=1, options=SHORT, progress=False)  # fmt: skip
     for name, weights in first.policy.weights.items():
         assert (weights == again.policy.weights[name]).all()
     assert (first.log.returns == again.log.returns).all()
@@ -295,10 +295,10 @@ def test_interrupted_training_goes_on_bit_for_bit(tmp_path: Path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train_gradient(
+        train("apg", 
             ID, TINY, options=SHORT, progress=False, checkpoint=file, checkpoint_seconds=0.0, report=interrupt,
         )  # fmt: skip
-    resumed = train_gradient(ID, TINY, options=SHORT, progress=False, checkpoint=file)
+    resumed = train("apg", ID, TINY, options=SHORT, progress=False, checkpoint=file)
     for name, weights in whole.policy.weights.items():
         assert (weights == resumed.policy.weights[name]).all()
     for name in ("steps", "returns", "lengths", "survived"):
@@ -307,9 +307,9 @@ def test_interrupted_training_goes_on_bit_for_bit(tmp_path: Path):
 
 def test_checkpoint_of_another_training_is_refused(tmp_path: Path):
     file = tmp_path / "checkpoint.safetensors"
-    train_gradient(ID, TINY, options=SHORT, progress=False, checkpoint=file)
+    train("apg", ID, TINY, options=SHORT, progress=False, checkpoint=file)
     with pytest.raises(CheckpointError, match="these settings"):
-        train_gradient(ID, replace(TINY, hidden=(4,)), options=SHORT, progress=False, checkpoint=file)  # fmt: skip
+        train("apg", ID, replace(TINY, hidden=(4,)), options=SHORT, progress=False, checkpoint=file)  # fmt: skip
 
 
 def test_trained_policy_is_kept_and_loaded_as_any_other(tmp_path: Path):
@@ -327,10 +327,10 @@ def test_trained_policy_is_kept_and_loaded_as_any_other(tmp_path: Path):
 
 
 def test_every_task_has_settings_and_formulas():
-    for env_id in ENV_IDS:
-        assert settings_for(env_id).steps > 0
-    with pytest.raises(ValueError, match="env_id must be one of"):
-        settings_for("LeanYaw/Nothing-v0")
+    for task in TASK_VERSIONS:
+        assert settings_for("apg", task).steps > 0
+    with pytest.raises(ValueError, match="task must be one of"):
+        settings_for("apg", "Nothing")
 
 
 @pytest.mark.parametrize(

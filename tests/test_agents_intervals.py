@@ -25,7 +25,7 @@ def width(estimate) -> float:
     return estimate.high - estimate.low
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(arrays(float, st.tuples(st.integers(1, 4), st.just(8)), elements=st.floats(-100, 100)))
 def test_the_interquartile_mean_is_scipy_s_trimmed_mean(values):
     # eight episodes: the quarters cut no value in part, which is all that scipy's knows

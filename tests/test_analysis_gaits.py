@@ -83,8 +83,8 @@ def test_pumping_walks_on_the_level_and_uphill() -> None:
     assert level.shift_work > 0.0
     # the prototype's claims: normal force never under 0.34, friction demand under 0.5
     for cycle in (level, uphill):
-        assert cycle.normal_force > 0.34
-        assert cycle.friction_demand < 0.5
+        assert cycle.least_normal_force > 0.34
+        assert cycle.greatest_friction < 0.5
 
 
 def test_pumped_walk_keeps_going_when_simulated() -> None:
@@ -206,8 +206,8 @@ def test_floor_demand_bounds_what_the_integrator_saw() -> None:
     demand = floor_demand(TABLE_1, samples=400)
     cycle = find_limit_cycle(TABLE_1)
     # both look at instants only; 400 of them miss the extreme by less than 1e-3
-    assert demand.least_normal_force == pytest.approx(cycle.normal_force, abs=1e-3)
-    assert demand.greatest_friction == pytest.approx(cycle.friction_demand, abs=1e-3)
+    assert demand.least_normal_force == pytest.approx(cycle.least_normal_force, abs=1e-3)
+    assert demand.greatest_friction == pytest.approx(cycle.greatest_friction, abs=1e-3)
     assert demand.greatest_normal_force < 1.0  # it arcs over its foot
     left, right = demand.steps
     assert left.normal_force == pytest.approx(right.normal_force, abs=1e-9)
@@ -230,7 +230,7 @@ def test_bad_commands_are_refused_by_name() -> None:
         find_limit_cycle(TABLE_1, mass_offset=(0.0, 2.0))
     with pytest.raises(ValueError, match="takes no inter_leg_angle"):
         find_limit_cycle(point_feet(0.004), inter_leg_angle=0.2)
-    with pytest.raises(ValueError, match="must be a Walker or a PassiveWalker"):
+    with pytest.raises(ValueError, match="must be a Walker, a PassiveWalker or a SectionMap"):
         find_limit_cycle("walker")  # pyright: ignore[reportArgumentType]
     with pytest.raises(ValueError, match="odd number of steps"):
         ActiveMap(TABLE_1, mass_offset=(0.01, 0.01), n_steps=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields
 from typing import Any
 
@@ -35,7 +36,7 @@ def _same_bits(a: Vector, b: Vector) -> bool:
 def test_a_batch_has_the_bits_of_its_walkers_one_by_one() -> None:
     bodies, states, sides, commands = _random_walkers(6_001, 3)
     result = step_batch(bodies, states, sides, **commands)
-    assert len(set(result.statuses)) == 7  # every end is among them
+    assert len(set(result.status)) == 7  # every end is among them
     assert _same_bits(result.outcomes, _single(bodies, states, sides, commands))
 
 
@@ -86,7 +87,7 @@ def test_the_friendly_single_step_says_the_same(gait: Vector) -> None:
     single = Walker().step(gait, stance="right", mass_offset=0.02, previous_offset=0.01)
     assert (result.states[0] == single.state).all()
     assert result.duration[0] == single.duration
-    assert result.least_normal_force[0] == single.normal_force
+    assert result.least_normal_force[0] == single.least_normal_force
     assert (result.displacement_x[0], result.displacement_z[0]) == tuple(single.displacement)
     assert result.stepped[0]
 
@@ -105,33 +106,68 @@ def test_bodies_come_from_parameters_one_or_many() -> None:
     assert len(fields(WalkerParameters)) == len(Body._fields)
 
 
-def test_an_unknown_column_is_refused(gait: Vector) -> None:
-    result = step_batch(WalkerParameters(), [gait], 1.0)
-    with pytest.raises(AttributeError, match="BatchResult has no attribute 'speed'"):
-        _ = result.speed
-    assert isinstance(result, BatchResult)
+def test_every_field_of_an_outcome_is_an_attribute_of_a_batch_s() -> None:
+    bodies, states, sides, commands = _random_walkers(50, 8)
+    result = step_batch(bodies, states, sides, **commands)
+    assert set(Outcome._fields) == set(BatchResult.__annotations__)
+    for k, name in enumerate(Outcome._fields):
+        assert (getattr(result, name) == result.outcomes[:, k]).all()
 
 
 GOOD = np.tile([0.0, 0.155, 0.0, -0.4, 0.0], (3, 1))
+BODIES = np.tile(np.array(WalkerParameters(friction_limit=1.0).body()), (3, 1))
+NAN_WIDTH = np.where(np.arange(11) == 0, np.nan, 1.0)
+ZERO_TILT = np.where(np.arange(11) == 2, 0.0, 1.0)
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"states": GOOD[0]}, r"states must have shape \(n, 5\), not \(5,\)"),
-        ({"states": GOOD[:, :4]}, r"states must have shape \(n, 5\), not \(3, 4\)"),
-        ({"states": GOOD * np.nan}, "states must be finite"),
-        ({"states": GOOD * [0, 11, 0, 0, 0]}, "within a quarter turn"),
+        ({"states": GOOD[0]}, r"states must have shape \(n, 5\), got \(5,\)"),
+        ({"states": GOOD[:, :4]}, r"states must have shape \(n, 5\), got \(3, 4\)"),
+        (
+            {"states": GOOD * np.nan},
+            r"states\[0\]: heading must be in \(-1e\+06, 1e\+06\), got nan",
+        ),
+        (
+            {"states": GOOD * [0, 11, 0, 0, 0]},
+            r"states\[0\]: stance_pitch must be in \(-1.5708, 1.5708\), got 1.705",
+        ),
         ({"sides": 0.5}, r"sides must be \+1 \(left\) or -1 \(right\)"),
-        ({"sides": [1.0, -1.0]}, r"sides must be a number or have shape \(3,\), not \(2,\)"),
+        ({"sides": [1.0, -1.0]}, "sides must be one number or 3 of them, got 2"),
         ({"sides": np.nan}, "sides"),
-        ({"inter_leg_angles": -0.1}, r"inter_leg_angles must be in \[0, 1.5708\], not -0.1"),
-        ({"inter_leg_angles": [0.3, 0.3, np.nan]}, "inter_leg_angles must be in .*, not nan"),
-        ({"mass_offsets": [0.0, 2.0, 0.0]}, r"mass_offsets must be in \[-1, 1\], not 2.0"),
-        ({"previous_offsets": -3.0}, "previous_offsets must be in"),
-        ({"parameters": [WalkerParameters()] * 2}, "parameters must be one or 3 walkers', not 2"),
-        ({"parameters": np.zeros((3, 4))}, r"parameters must have shape \(n, 11\), not \(3, 4\)"),
-        ({"threads": 0}, r"threads must be in \[1, 1024\], not 0"),
+        ({"inter_leg_angles": -0.1}, r"inter_leg_angles\[0\] must be in \(0, 1.5708\), got -0.1"),
+        ({"inter_leg_angles": [0.3, 0.3, np.nan]}, r"inter_leg_angles\[2\] must be in .*, got nan"),
+        ({"mass_offsets": [0.0, 2.0, 0.0]}, r"mass_offsets\[1\] must be in \[-1, 1\], got 2.0"),
+        ({"previous_offsets": -3.0}, r"previous_offsets\[0\] must be in"),
+        ({"parameters": [WalkerParameters()] * 2}, "parameters must be of one or 3 walkers, got 2"),
+        ({"parameters": np.zeros((3, 4))}, r"parameters must have shape \(n, 11\), got \(3, 4\)"),
+        ({"threads": 0}, "threads must be from 1 to 1024, got 0"),
+        ({"threads": 1.7}, "threads must be a whole number from 1 to 1024, got 1.7"),
+        # what ``Walker.step`` refuses too
+        (
+            {"states": np.add(GOOD, [0, 0, 0, 1e300, 0])},
+            r"states\[0\]: stance_pitch_rate must be in",
+        ),
+        ({"states": GOOD.astype(complex)}, "states must hold numbers"),
+        ({"states": [[0.0], [0.0, 1.0]]}, "states must hold numbers"),
+        ({"inter_leg_angles": 0.0}, r"inter_leg_angles\[0\] must be in \(0, 1.5708\), got 0.0"),
+        ({"inter_leg_angles": [0.3, 0.3, math.pi / 2]}, r"inter_leg_angles\[2\] must be in"),
+        ({"inter_leg_angles": None}, "inter_leg_angles must be a number, got None"),
+        ({"mass_offsets": True}, "mass_offsets must be a number, got True"),
+        (
+            {"parameters": BODIES * NAN_WIDTH},
+            r"parameters\[0\]: hip_width must be in \[0, 2\], got nan",
+        ),
+        (
+            {"parameters": BODIES * ZERO_TILT},
+            r"parameters\[0\]: ankle_tilt must be in \(0, 1.5708\], got 0.0",
+        ),
+        (
+            {"parameters": [WalkerParameters(), None]},
+            r"parameters\[1\] must be WalkerParameters, got None",
+        ),
+        ({"parameters": None}, r"parameters\[0\] must be WalkerParameters, got None"),
     ],
 )
 def test_bad_input_is_refused_by_name(arguments: dict[str, Any], message: str) -> None:

@@ -14,6 +14,7 @@ from scipy.integrate import solve_ivp
 from lean_yaw_env.vehicles import (
     BENCHMARK_2007,
     BRANCH_NAMES,
+    UNNAMED_BRANCHES,
     BicycleParameters,
     FrameBody,
     LinearBicycle,
@@ -31,7 +32,7 @@ PUBLISHED_DIGITS = 6e-14
 """The benchmark prints 14 decimals, so half a unit of the last one is the least to allow; the rest
 is room for the round-off, relative 1e-15, of matrix entries up to 80."""
 
-few = settings(max_examples=40, deadline=None)
+few = settings(max_examples=40)
 
 
 def _varied_frame(frame: FrameBody, mass: float, x: float, z: float) -> FrameBody:
@@ -329,6 +330,15 @@ def test_no_meeting_of_real_roots_is_missed_or_made_up(parameters):
         assert np.any((meetings >= grid[i]) & (meetings <= grid[i + 1]))
 
 
+# No trail and a fork that leans forward: four real eigenvalues at every speed
+NO_OSCILLATION = replace(
+    BENCHMARK_2007,
+    wheelbase=1.25,
+    trail=0.0,
+    steer_axis_tilt=-0.0625,
+    front_frame=replace(BENCHMARK_2007.front_frame, z=-0.525),
+    front_wheel=replace(BENCHMARK_2007.front_wheel, radius=0.4375),
+)
 # Two real modes that come near each other below 0.1 m/s, where long and short steps once told them apart differently
 CLOSE_MODES = replace(
     BENCHMARK_2007,
@@ -341,9 +351,10 @@ CLOSE_MODES = replace(
 )
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(parameters=bicycles)
 @example(parameters=CLOSE_MODES)
+@example(parameters=NO_OSCILLATION)
 def test_modes_followed_do_not_depend_on_the_grid(parameters):
     bicycle = benchmark_bicycle(parameters)
     fine = follow_eigenvalues(bicycle, np.linspace(0.0, 10.0, 201))
@@ -351,6 +362,31 @@ def test_modes_followed_do_not_depend_on_the_grid(parameters):
     # The same matrices by the same steps, so the same numbers, in reverse order.
     np.testing.assert_array_equal(coarse.eigenvalues[::-1], fine.eigenvalues[::50])
     np.testing.assert_array_equal(coarse.mode_shapes[::-1], fine.mode_shapes[::50])
+
+
+@pytest.mark.parametrize(
+    "bicycle",
+    [
+        benchmark_bicycle(NO_OSCILLATION),
+        LinearBicycle(np.eye(2), np.zeros((2, 2)), -np.eye(2), np.zeros((2, 2))),  # equal pairs
+        LinearBicycle(np.eye(2), np.zeros((2, 2)), np.eye(2), np.zeros((2, 2))),  # two oscillations
+        LinearBicycle(np.eye(2), np.eye(2), np.zeros((2, 2)), np.zeros((2, 2))),  # two zeros
+        LinearBicycle(np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 2))),  # all zero
+    ],
+    ids=["no oscillation", "equal pairs", "two oscillations", "two zeros", "all zero"],
+)
+def test_a_bicycle_whose_modes_have_no_names_has_branches(bicycle):
+    branches = follow_eigenvalues(bicycle, np.linspace(0.0, 10.0, 201))
+    assert branches.names == UNNAMED_BRANCHES
+    largest = np.max(np.abs(branches.eigenvalues))
+    for speed, row in zip(branches.speeds, branches.eigenvalues, strict=True):
+        # The same matrix by the same solver, only sorted in another way.
+        np.testing.assert_array_equal(np.sort_complex(row)[::-1], bicycle.eigenvalues(speed)[0])
+    # The benchmark's steepest branch rises by 1.4 / m over the grid's 0.05 m/s, a hundredth of 37 / s.
+    assert np.all(np.abs(np.diff(branches.eigenvalues, axis=0)) <= 0.02 * largest)
+    for name in ("weave", "capsize", "caster", "is_weave_oscillatory"):
+        with pytest.raises(ValueError, match="this bicycle's modes have no names"):
+            getattr(branches, name)
 
 
 def test_modes_are_followed_continuously_through_the_double_root():
@@ -439,22 +475,18 @@ def test_impossible_bicycle_is_refused_by_name(build, message):
     ],
 )
 def test_impossible_matrix_is_refused_by_name(name, matrix):
-    with pytest.raises(ValueError, match=f"{name} must be"):
+    with pytest.raises(ValueError, match=f"{name} must (be|have|hold)"):
         replace(paper_bicycle(), **{name: matrix})
 
 
 def test_bad_arguments_are_refused_by_name():
     bicycle = paper_bicycle()
-    with pytest.raises(ValueError, match="speeds must be finite"):
+    with pytest.raises(ValueError, match="speeds must hold finite numbers, got nan"):
         bicycle.eigenvalues(math.nan)
-    with pytest.raises(ValueError, match=r"speeds must be in \[0, inf\)"):
+    with pytest.raises(ValueError, match=r"speeds must hold numbers in \[0, inf\), got -1.0"):
         follow_eigenvalues(bicycle, [-1.0, 2.0])
     with pytest.raises(ValueError, match="steer must be a finite number"):
         bicycle.motion(1.0, [0.0], steer=math.inf)
-    with pytest.raises(ValueError, match="the modes cannot be named"):
-        follow_eigenvalues(
-            LinearBicycle(np.eye(2), np.zeros((2, 2)), -np.eye(2), np.zeros((2, 2))), 1.0
-        )
 
 
 def test_matrices_of_a_bicycle_cannot_be_changed():

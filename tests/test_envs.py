@@ -164,8 +164,8 @@ def test_a_step_is_the_walker_s_own(mirror: bool) -> None:
         assert (info["footprint"] == place + result.displacement).all()
         ledger = [info[k] for k in ("gravity_work", "shift_work", "impact_loss", "ankle_loss")]
         assert ledger == list(result.energy)
-        assert info["least_normal_force"] == result.normal_force
-        assert info["greatest_friction"] == result.friction_demand
+        assert info["least_normal_force"] == result.least_normal_force
+        assert info["greatest_friction"] == result.greatest_friction
 
 
 def test_zero_action_is_the_paper_s_fixed_controller(gait: Vector) -> None:

@@ -39,12 +39,12 @@ def _error(
         state,
         stance=stance,
         inter_leg_angle=command.inter_leg_angle,
-        mass_offset=command.offset,
-        previous_offset=command.offset_before,
+        mass_offset=command.mass_offset,
+        previous_offset=command.previous_offset,
     )
     assert result.fall is None
     after, duration, displacement = _reference(parameters).step(
-        state, SIDE[stance], command.inter_leg_angle, command.offset_before, command.offset
+        state, SIDE[stance], command.inter_leg_angle, command.previous_offset, command.mass_offset
     )
     # the reference reads headings from a rotation, which knows no full turns
     turns = np.round((result.state[0] - after[0]) / (2 * np.pi)) * 2 * np.pi
@@ -94,7 +94,7 @@ def test_a_heel_strike_in_mid_shift_agrees_with_the_reference(gait: Vector) -> N
         parameters = WalkerParameters(shift_time=2.0)
         error, result = _error(parameters, state, stance, command)
         assert error < ACCURACY
-        assert abs(result.mass_offset) < abs(command.offset)  # locked on the way
+        assert abs(result.mass_offset) < abs(command.mass_offset)  # locked on the way
 
 
 def test_other_bodies_with_springs_agree_with_the_reference(gait: Vector) -> None:

@@ -46,7 +46,7 @@ states = json.loads({states!r})
 results = []
 for state in states:
     one = walker.step(state, mass_offset=0.02, previous_offset=-0.01)
-    results.append([*one.state, one.duration, *one.displacement, *one.energy, one.normal_force])
+    results.append([*one.state, one.duration, *one.displacement, *one.energy, one.least_normal_force])
 batch = step_batch(walker.parameters, states, 1.0, mass_offsets=0.02, previous_offsets=-0.01)
 derivatives = differentiate_step(walker, states[0], "left", require_command(0.3, 0.02, -0.01))
 print(json.dumps({{

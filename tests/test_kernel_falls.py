@@ -96,7 +96,7 @@ def test_masses_flung_across_lift_the_foot(gait: Vector) -> None:
     walker = Walker(WalkerParameters(shift_time=0.1))
     result = walker.step(gait, mass_offset=0.05, previous_offset=-0.05)
     assert result.fall is Fall.LIFT_OFF
-    assert result.normal_force <= 0.0
+    assert result.least_normal_force <= 0.0
     gentle = Walker().step(gait, mass_offset=0.005, previous_offset=0.0)
     assert gentle.fall is None
 
@@ -107,7 +107,7 @@ def test_a_walker_that_vaults_too_fast_lifts_off_at_once(gait: Vector) -> None:
 
 
 def test_too_smooth_a_floor_lets_the_foot_slip(gait: Vector) -> None:
-    demand = Walker().step(gait).friction_demand
+    demand = Walker().step(gait).greatest_friction
     assert 0.1 < demand < 0.3
     slippery = Walker(WalkerParameters(friction_limit=demand * 0.999)).step(gait)
     assert slippery.fall is Fall.SLIP
@@ -166,7 +166,7 @@ def test_whatever_the_walker_its_step_ends_by_name() -> None:
     result = step_batch(bodies, states, sides, **commands)
     known = {records.STEPPED, records.BACKWARD, records.SIDEWAYS, records.TRIP}
     known |= {records.LIFT_OFF, records.SLIP, records.NO_STRIKE}
-    assert set(result.statuses) == known
+    assert set(result.status) == known
     assert (result.evaluations < 13 * MOST_ATTEMPTS).all()
     stepped = result.outcomes[result.stepped]
     assert len(stepped) > 10_000
@@ -180,16 +180,16 @@ def test_whatever_the_walker_its_step_ends_by_name() -> None:
 def test_every_fall_meets_its_own_criterion() -> None:
     bodies, states, sides, commands = _random_walkers(4_000, 2)
     result = step_batch(bodies, states, sides, **commands)
-    fell = {status: result.outcomes[result.statuses == status] for status in set(result.statuses)}
+    fell = {status: result.outcomes[result.status == status] for status in set(result.status)}
     ends = {name: k for k, name in enumerate(records.Outcome._fields)}
     assert (fell[records.BACKWARD][:, ends["stance_pitch_rate"]] >= BACKWARD_RATE).all()
     assert (fell[records.LIFT_OFF][:, ends["least_normal_force"]] <= 0.0).all()
     assert (fell[records.TRIP][:, ends["duration"]] == 0.0).all()
-    slips = result.statuses == records.SLIP
+    slips = result.status == records.SLIP
     assert (result.greatest_friction[slips] > bodies[slips, 7]).all()
-    late = result.statuses == records.NO_STRIKE
+    late = result.status == records.NO_STRIKE
     assert (result.duration[late] >= bodies[late, 8]).all()
-    for i in np.flatnonzero(result.statuses == records.TRIP)[:100]:
+    for i in np.flatnonzero(result.status == records.TRIP)[:100]:
         parameters = WalkerParameters(*bodies[i, :4])
         mirrored = states[i] * [sides[i], 1.0, sides[i], 1.0, sides[i]]
         assert _gap(parameters, mirrored, commands["inter_leg_angles"][i]) <= 1e-12
@@ -206,7 +206,7 @@ def test_no_walker_called_fallen_backward_would_have_stepped_on(gait: Vector) ->
     result = step_batch(
         bodies, states, 1.0, inter_leg_angles=angles, mass_offsets=offsets
     )  # fmt: skip
-    fallen = np.flatnonzero(result.statuses == records.BACKWARD)
+    fallen = np.flatnonzero(result.status == records.BACKWARD)
     assert len(fallen) > 300
     for i in fallen[:30]:
         motion = Walker(bodies[i]).stance_motion(
@@ -245,9 +245,9 @@ def test_the_least_normal_force_is_missed_by_little(
             assert result.fall is Fall.LIFT_OFF
             continue
         motion = walker.stance_motion(state, duration=result.duration, samples=1000, **options)
-        misses.append(result.normal_force - motion["normal_force"].min())
-        if result.normal_force > 0.3:
-            friction_misses.append(motion["friction_demand"].max() - result.friction_demand)
+        misses.append(result.least_normal_force - motion["normal_force"].min())
+        if result.least_normal_force > 0.3:
+            friction_misses.append(motion["friction_demand"].max() - result.greatest_friction)
     assert len(misses) >= 20
     # The limits are some twice what hundreds of such steps showed; the quartic between looks may go too low as well
     assert min(misses) > -miss

@@ -205,7 +205,7 @@ def test_swing_foot_stays_over_the_floor_and_lands_where_the_contact_is_reported
     np.testing.assert_allclose(swing_pivot[-1], expected, atol=1e-11)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(nearby, headings, st.sampled_from(["left", "right"]), st.floats(-0.03, 0.03))
 def test_stance_keeps_energy_and_constraints_and_impact_takes_energy(
     factors: tuple[float, ...], heading: float, stance: str, offset: float
@@ -224,7 +224,7 @@ def test_stance_keeps_energy_and_constraints_and_impact_takes_energy(
         assert step.fall in FALLS
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(nearby, headings, st.floats(-0.03, 0.03))
 def test_a_mirrored_walker_walks_a_mirrored_step(
     factors: tuple[float, ...], heading: float, offset: float
@@ -554,14 +554,14 @@ def test_no_gait_near_the_guess_is_a_named_error() -> None:
 @pytest.mark.parametrize(
     ("name", "value", "allowed"),
     [
-        ("hip_width", -0.1, ">= 0"),
-        ("hip_width", float("nan"), ">= 0"),
+        ("hip_width", -0.1, r"\[0, inf\)"),
+        ("hip_width", float("nan"), r"\[0, inf\)"),
         ("foot_radius", 1.0, r"\[0, 1\)"),
-        ("ankle_tilt", 0.0, r"\(0, pi/2\]"),
-        ("slope", 1.6, r"\(-pi/2, pi/2\)"),
-        ("foot_mass", 0.0, "> 0"),
-        ("shift_time", 0.0, "> 0"),
-        ("tolerance", 1e-15, r"\[1e-13, 1e-3\]"),
+        ("ankle_tilt", 0.0, r"\(0, 1.5708\]"),
+        ("slope", 1.6, r"\(-1.5708, 1.5708\)"),
+        ("foot_mass", 0.0, r"\(0, inf\)"),
+        ("shift_time", 0.0, r"\(0, inf\)"),
+        ("tolerance", 1e-15, r"\[1e-13, 0.001\]"),
     ],
 )
 def test_a_bad_parameter_is_refused_by_name(name: str, value: float, allowed: str) -> None:
@@ -572,11 +572,11 @@ def test_a_bad_parameter_is_refused_by_name(name: str, value: float, allowed: st
 @pytest.mark.parametrize(
     ("state", "options", "message"),
     [
-        (TABLE_2, {"stance": "middle"}, "stance must be 'left' or 'right', got 'middle'"),
-        (TABLE_2, {"swing": "kicked"}, "swing must be 'held' or 'passive', got 'kicked'"),
+        (TABLE_2, {"stance": "middle"}, "stance must be one of left, right, got 'middle'"),
+        (TABLE_2, {"swing": "kicked"}, "swing must be one of held, passive, got 'kicked'"),
         (TABLE_2[:4], {}, "state of a held step must have 5 entries, got 4"),
-        ((0.0, float("nan"), 0.0, -0.4, 0.0), {}, r"state\[1\] must be a finite number, got nan"),
-        (TABLE_2, {"inter_leg_angle": -0.3}, r"must be in \(0, pi\), got -0.3"),
+        ((0.0, float("nan"), 0.0, -0.4, 0.0), {}, "state must hold finite numbers, got nan"),
+        (TABLE_2, {"inter_leg_angle": -0.3}, r"must be in \(0, 3.14159\), got -0.3"),
         (TABLE_2, {"mass_offset": float("inf")}, "mass_offset must be a finite number, got inf"),
         (TABLE_2, {"swing_rate": 0.1}, "swing_rate is for a passive leg, got 0.1"),
         (TABLE_2, {"swing": "passive"}, "a passive step needs a state of 6 entries"),

@@ -251,7 +251,7 @@ def test_walk_agrees_with_single_steps() -> None:
     assert walk.inter_leg_angles.shape == (len(walk.states),)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.tuples(*(st.floats(-1.0, 1.0) for _ in range(6))), st.sampled_from(["left", "right"]))
 def test_any_start_ends_in_a_step_or_a_named_fall(shares, stance) -> None:
     state = np.array([0.3, 0.1, 0.2, 0.4, 0.4, 0.5]) * shares + [0, 0.2, 0, -0.3, 0, 0]
@@ -276,7 +276,7 @@ def test_many_steps_are_the_same_as_single_ones() -> None:
         ([0.0] * 5, "shape"),
         ([0.0, 2.0, 0.0, -0.1, 0.0, 0.0], "stance_pitch must be in"),
         ([0.0, 0.1, 0.0, -0.1, 0.0, np.nan], "inter_leg_rate must be in"),
-        (["a"] * 6, "must hold 6 numbers"),
+        (["a"] * 6, r"must hold numbers in shape \(6,\)"),
         ([0.0, -0.1, 0.0, -0.1, 0.0, 0.0], "stance_pitch must be positive"),
     ],
 )
@@ -297,7 +297,7 @@ def test_other_bad_input_is_refused() -> None:
         PassiveWalker(WalkerParameters(), planar="yes")  # pyright: ignore[reportArgumentType]
     with pytest.raises(ValueError, match="inter_leg_angle must be in"):
         WIDE.step(UNEVEN, inter_leg_angle=2.0)
-    with pytest.raises(ValueError, match="n_steps must be in"):
+    with pytest.raises(ValueError, match="n_steps must be from 1"):
         WIDE.walk(0, state=UNEVEN)
-    with pytest.raises(ValueError, match="samples must be in"):
+    with pytest.raises(ValueError, match="samples must be from 2"):
         WIDE.motion(UNEVEN, duration=1.0, samples=1)

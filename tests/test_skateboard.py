@@ -25,7 +25,7 @@ skateboards = st.builds(
     gravity=st.floats(1.0, 25.0),
     damping=st.floats(0.0, 300.0),
 )
-few = settings(max_examples=60, deadline=None)
+few = settings(max_examples=60)
 
 
 # Laws
@@ -176,9 +176,9 @@ def test_impossible_parameter_is_refused_by_name(name, value):
 
 def test_bad_arguments_are_refused_by_name():
     board = Skateboard()
-    with pytest.raises(ValueError, match="speeds must be finite"):
+    with pytest.raises(ValueError, match="speeds must hold finite numbers, got nan"):
         board.eigenvalues([1.0, math.nan])
-    with pytest.raises(ValueError, match="speeds must be a number or a non-empty sequence"):
+    with pytest.raises(ValueError, match="speeds must hold one number or more, got none"):
         board.eigenvalues([])
     with pytest.raises(ValueError, match="speed must be a finite number"):
         board.equation_of_motion(math.inf)
@@ -186,7 +186,7 @@ def test_bad_arguments_are_refused_by_name():
         board.lateral_acceleration(math.nan, 1.0)
     with pytest.raises(ValueError, match="lean_rate must be a finite number"):
         board.motion(1.0, [0.0], lean_rate=math.nan)
-    with pytest.raises(ValueError, match="times must be a number"):
+    with pytest.raises(ValueError, match=r"times must have shape \(n,\), got \(1, 1\)"):
         board.motion(1.0, [[0.0]])
 
 

@@ -231,9 +231,9 @@ GOOD = [0.0, 0.155, 0.0, -0.4, 0.0]
     [
         ({"state": GOOD[:4]}, r"state must have shape \(5,\)"),
         ({"state": [math.nan, *GOOD[1:]]}, "state: heading must be in"),
-        ({"stance": "middle"}, "stance must be 'left' or 'right', not 'middle'"),
-        ({"inter_leg_angle": 1.6}, r"inter_leg_angle must be in \(0, 1.5708\), not 1.6"),
-        ({"mass_offset": -1.5}, r"mass_offset must be in \[-1, 1\], not -1.5"),
+        ({"stance": "middle"}, "stance must be one of left, right, got 'middle'"),
+        ({"inter_leg_angle": 1.6}, r"inter_leg_angle must be in \(0, 1.5708\), got 1.6"),
+        ({"mass_offset": -1.5}, r"mass_offset must be in \[-1, 1\], got -1.5"),
         ({"previous_offset": "left"}, r"previous_offset must be a number in \[-1, 1\]"),
     ],
 )
@@ -245,9 +245,17 @@ def test_a_bad_step_is_refused_by_name(arguments: dict[str, Any], message: str) 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"n_steps": 0}, "n_steps must be in"),
-        ({"n_steps": "many"}, "n_steps must be a number"),
-        ({"samples_per_step": 1}, "samples_per_step must be in"),
+        ({"n_steps": 0}, "n_steps must be from 1 to 10000000, got 0"),
+        ({"n_steps": "many"}, "n_steps must be a whole number"),
+        ({"n_steps": 2.0}, "n_steps must be a whole number from 1 to 10000000, got 2.0"),
+        ({"n_steps": True}, "n_steps must be a whole number"),
+        ({"samples_per_step": 1}, "samples_per_step must be 0 or from 2 to 10000, got 1"),
+        (
+            {"samples_per_step": 2.5},
+            "samples_per_step must be a whole number from 0 to 10000, got 2.5",
+        ),
+        ({"mass_offset": [[0.0], 0.1, 0.2]}, "mass_offset must hold numbers"),
+        ({"mass_offset": None}, "mass_offset must be a number, got None"),
         ({"mass_offset": [0.0, 0.1]}, "mass_offset must be one number or 3 of them"),
         ({"inter_leg_angle": [0.3, 0.3, 9.0]}, "inter_leg_angle must be in"),
         ({"mass_offset": [0.0, 0.0, math.nan]}, "mass_offset must be in"),
@@ -264,7 +272,8 @@ def test_a_bad_walk_is_refused_by_name(arguments: dict[str, Any], message: str) 
     [
         ({"duration": 0.0}, "duration must be in"),
         ({"duration": math.inf}, "duration must be in"),
-        ({"samples": 1}, "samples must be in"),
+        ({"samples": 1}, "samples must be from 2 to 1000000, got 1"),
+        ({"samples": 2.7}, "samples must be a whole number from 2 to 1000000, got 2.7"),
     ],
 )
 def test_a_bad_motion_is_refused_by_name(arguments: dict[str, Any], message: str) -> None:
@@ -273,6 +282,6 @@ def test_a_bad_motion_is_refused_by_name(arguments: dict[str, Any], message: str
 
 
 def test_a_walker_takes_parameters_only() -> None:
-    with pytest.raises(ValueError, match="parameters must be WalkerParameters, not "):
+    with pytest.raises(ValueError, match="parameters must be WalkerParameters, got "):
         Walker({"slope": 0.1})  # pyright: ignore[reportArgumentType]
     assert Walker() == Walker(replace(WalkerParameters()))

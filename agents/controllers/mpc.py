@@ -12,21 +12,24 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.agent import Agent, State
-from agents.controllers.guidance import guided
-from agents.controllers.mpc_rollouts import Rollouts
-from agents.controllers.mpc_settings import SETTINGS, MpcSettings
-from agents.controllers.simple import FixedController
 from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
 from lean_yaw_env.envs.rows import WalkerRows
 from lean_yaw_env.errors import NoGaitError
-from lean_yaw_env.parameters import Vector, require_number
+from lean_yaw_env.parameters import Vector
+from lean_yaw_env.validation import require_number
+
+from ..agent import Agent, State
+from ..settings import tuned
+from .guidance import guided
+from .mpc_rollouts import Rollouts
+from .mpc_settings import MpcSettings
+from .simple import FixedController
 
 _TABLES = 16  # of random numbers, one for each step of an episode in turn
 _BLOCK = 4096  # rows walked together: they stay in the processor's cache
 _FLOOR = 0.12  # least spread, as a share of the first: what is found early may still be left
-_DIRECTIONS = 3  # of ``Spread``
+_DIRECTIONS = 3  # of ``PlanSpread``
 
 
 class HasRows(Protocol):
@@ -68,7 +71,7 @@ class MpcController:
     ) -> None:
         self._task = task
         self._options = EnvOptions() if options is None else options
-        self._settings = SETTINGS.get(task, MpcSettings()) if settings is None else settings
+        self._settings = tuned("mpc", task, MpcSettings()) if settings is None else settings
         self._seed = int(require_number("seed", seed, 0, 2**63))
         self._base = _regulator(task, self._options) if base is None else base
         settings = self._settings

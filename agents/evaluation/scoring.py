@@ -7,14 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from agents.agent import Agent, State, attach
-from agents.evaluation.results import RETURN, SPEED, Episodes, Results, Row, summary
-from agents.seeds import MOST_EPISODES, evaluation_seed
 from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import Task, task_named
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
-from lean_yaw_env.parameters import Vector, require_number
+from lean_yaw_env.parameters import Vector
+from lean_yaw_env.validation import require_count
+
+from ..agent import Agent, State, attach
+from ..seeds import MOST_EPISODES, evaluation_seed
+from .results import RETURN, SPEED, Episodes, Results, Row, summary
 
 _CHUNK = 1024  # walkers stepped together
 
@@ -48,7 +50,7 @@ def run_episodes(
     ValueError
         If a number is out of its range.
     """
-    total = int(require_number("episodes", episodes, 1, MOST_EPISODES))
+    total = require_count("episodes", episodes, 1, MOST_EPISODES)
     first = evaluation_seed(seed)
     return run_seeds(agent, task, range(first, first + total), options=options, progress=progress)
 
@@ -86,7 +88,7 @@ def evaluate(
         If there are no agents, or as ``run_episodes``.
     """
     if not agents:
-        raise ValueError("agents must hold one agent or more, not none")
+        raise ValueError("agents must hold one agent or more, got none")
     rows: list[Row] = []
     for name, agent in agents.items():
         walked = run_episodes(

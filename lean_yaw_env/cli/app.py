@@ -90,7 +90,7 @@ def gait(
 ) -> None:
     """Find a walker's limit cycle and print it with its multipliers; the defaults are Table 1's."""
     from lean_yaw_env.analysis import find_limit_cycle
-    from lean_yaw_env.analysis.section_map import section_map_of
+    from lean_yaw_env.analysis import section_map_of
 
     walker = walker_of(hip_width, foot_radius, ankle_tilt, slope, passive=passive, planar=planar)
     command: dict[str, Any] = {
@@ -296,8 +296,3 @@ def reproduce(
         return
     screen.show_reproduction(reproduction)
     typer.echo(f"written: {markdown} and {page}")
-
-
-def main() -> None:
-    """Entry point of ``lean-yaw``."""
-    app()

@@ -20,7 +20,7 @@ def parse_range(text: str, name: str = "range") -> Vector:
         If it is neither, low is not below high, or the count is not in [2, 100000].
     """
     fields = text.split(":")
-    form = f"{name} must be a number or low:high:count, such as 0.1:0.8:15; not {text!r}"
+    form = f"{name} must be a number or low:high:count, such as 0.1:0.8:15, got {text!r}"
     try:
         numbers = [float(field) for field in fields[:2]]
         count = int(fields[2]) if len(fields) == 3 else 1
@@ -31,9 +31,9 @@ def parse_range(text: str, name: str = "range") -> Vector:
     if len(fields) == 1:
         return np.array(numbers)
     if not numbers[0] < numbers[1]:
-        raise ValueError(f"{name} must rise from low to high, not {text!r}")
+        raise ValueError(f"{name} must rise from low to high, got {text!r}")
     if not 2 <= count <= MOST_POINTS:
-        raise ValueError(f"{name}: the count must be in [2, {MOST_POINTS}], not {count}")
+        raise ValueError(f"{name}: the count must be in [2, {MOST_POINTS}], got {count}")
     return np.linspace(numbers[0], numbers[1], count)
 
 
@@ -48,7 +48,7 @@ def parse_axis(text: str) -> tuple[str, Vector]:
     name, sign, values = text.partition("=")
     if not sign or not name:
         raise ValueError(
-            f"axis must be name=low:high:count, such as slope=0.005:0.05:10; not {text!r}"
+            f"axis must be name=low:high:count, such as slope=0.005:0.05:10, got {text!r}"
         )
     return name.strip().replace("-", "_"), parse_range(values, f"axis {name.strip()}")
 

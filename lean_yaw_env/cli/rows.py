@@ -11,7 +11,6 @@ import numpy as np
 
 from lean_yaw_env.analysis import LimitCycle, modes
 from lean_yaw_env.vehicles import (
-    BRANCH_NAMES,
     LinearBicycle,
     Skateboard,
     critical_speed,
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from lean_yaw_env.parameters import Vector
 
 Record = dict[str, Any]
-_MAP_NUMBERS = ("speed", "step_length", "spectral_radius", "friction_demand")
+_MAP_NUMBERS = ("speed", "step_length", "spectral_radius", "greatest_friction")
 
 
 def plain(value: Any) -> Any:
@@ -63,8 +62,8 @@ def gait_record(cycle: LimitCycle, names: Sequence[str]) -> Record:
         "turn_per_stride": cycle.turn,
         "gravity_work_per_distance": cycle.gravity_work,
         "shift_work_per_distance": cycle.shift_work,
-        "least_normal_force": cycle.normal_force,
-        "greatest_friction_demand": cycle.friction_demand,
+        "least_normal_force": cycle.least_normal_force,
+        "greatest_friction": cycle.greatest_friction,
         "residual": cycle.residual,
         "modes": [
             {
@@ -120,7 +119,7 @@ def bicycle_record(bicycle: LinearBicycle, speeds: Vector) -> Record:
         "capsize_speed": bicycle.capsize_speed(),
         "stable_speeds": None if limits is None else list(limits),
         "eigenvalues": [
-            {"speed": speed, **dict(zip(BRANCH_NAMES, row, strict=True))}
+            {"speed": speed, **dict(zip(branches.names, row, strict=True))}
             for speed, row in zip(branches.speeds, branches.eigenvalues, strict=True)
         ],
     }

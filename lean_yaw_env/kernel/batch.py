@@ -49,7 +49,7 @@ def _load_stance(work, i):
         work[_STANCE + 10 * _ROW + i],  # cos_inter_leg
         work[_STANCE + 11 * _ROW + i],  # ankle_stiffness
         work[_STANCE + 12 * _ROW + i],  # ankle_damping
-        work[_STANCE + 13 * _ROW + i],  # offset_before
+        work[_STANCE + 13 * _ROW + i],  # previous_offset
         work[_STANCE + 14 * _ROW + i],  # offset_change
         work[_STANCE + 15 * _ROW + i],  # shift_rate
         work[_STANCE + 16 * _ROW + i],  # friction_limit_squared
@@ -72,7 +72,7 @@ def _store_stance(work, i, stance):
     work[_STANCE + 10 * _ROW + i] = stance.cos_inter_leg
     work[_STANCE + 11 * _ROW + i] = stance.ankle_stiffness
     work[_STANCE + 12 * _ROW + i] = stance.ankle_damping
-    work[_STANCE + 13 * _ROW + i] = stance.offset_before
+    work[_STANCE + 13 * _ROW + i] = stance.previous_offset
     work[_STANCE + 14 * _ROW + i] = stance.offset_change
     work[_STANCE + 15 * _ROW + i] = stance.shift_rate
     work[_STANCE + 16 * _ROW + i] = stance.friction_limit_squared
@@ -154,8 +154,8 @@ def _load_body(work, i):
 def _load_command(work, i):
     return Command(
         work[_COMMAND + 0 * _ROW + i],  # inter_leg_angle
-        work[_COMMAND + 1 * _ROW + i],  # offset
-        work[_COMMAND + 2 * _ROW + i],  # offset_before
+        work[_COMMAND + 1 * _ROW + i],  # mass_offset
+        work[_COMMAND + 2 * _ROW + i],  # previous_offset
     )
 
 
@@ -171,7 +171,7 @@ def _store_outcome(work, i, outcome):
     work[_OUTCOME + 7 * _ROW + i] = outcome.displacement_x
     work[_OUTCOME + 8 * _ROW + i] = outcome.displacement_z
     work[_OUTCOME + 9 * _ROW + i] = outcome.heading_change
-    work[_OUTCOME + 10 * _ROW + i] = outcome.offset
+    work[_OUTCOME + 10 * _ROW + i] = outcome.mass_offset
     work[_OUTCOME + 11 * _ROW + i] = outcome.least_normal_force
     work[_OUTCOME + 12 * _ROW + i] = outcome.greatest_friction
     work[_OUTCOME + 13 * _ROW + i] = outcome.gravity_work

@@ -22,7 +22,7 @@ _TINY = 1e-30
 INPUTS = 8
 STATE_SIZE = 5
 # Outputs in the order of the rows: the section state, then what else a step is judged by.
-OUTPUTS = ("heading", "stance_pitch", "ankle_angle", "stance_pitch_rate", "ankle_rate", "duration", "displacement_x", "displacement_z", "offset", "shift_work")  # fmt: skip
+OUTPUTS = ("heading", "stance_pitch", "ankle_angle", "stance_pitch_rate", "ankle_rate", "duration", "displacement_x", "displacement_z", "mass_offset", "shift_work")  # fmt: skip
 _ROWS = len(Flight._fields)
 _IMAGINARY = _ROWS * INPUTS  # where the imaginary parts begin
 _STATUS = Flight._fields.index("status") * INPUTS
@@ -39,8 +39,8 @@ def _stance(body, command, heading, side, lane):
     """What is constant in the step, as lane ``lane`` differentiates it."""
     seeded = Command(
         _seeded(command.inter_leg_angle, lane, 5),
-        _seeded(command.offset, lane, 6),
-        _seeded(command.offset_before, lane, 7),
+        _seeded(command.mass_offset, lane, 6),
+        _seeded(command.previous_offset, lane, 7),
     )
     return stance_of(body, seeded, _seeded(heading, lane, 0), side)
 
@@ -161,7 +161,7 @@ def _end(work, body, command, heading, side):
         _keep(work, 6, lane, outcome.duration)
         _keep(work, 7, lane, outcome.displacement_x)
         _keep(work, 8, lane, outcome.displacement_z)
-        _keep(work, 9, lane, outcome.offset)
+        _keep(work, 9, lane, outcome.mass_offset)
         _keep(work, 10, lane, outcome.shift_work)
 
 
@@ -169,14 +169,14 @@ def _end(work, body, command, heading, side):
 def step_jacobian(
     body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side, state, jacobian
 ):
-    """Write the next section state (5,) and the derivatives (k, 8) of the first k of ``OUTPUTS`` by state and command; return how the
-    step ended.
+    """Write the first k of ``OUTPUTS`` (k,), 5 of them the next section state, and their derivatives (m, 8) by state and command; return
+    how the step ended.
     """
     work = np.zeros(2 * _IMAGINARY)
     _begin(work, body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side)
     _fly(work, body, command, heading, side)
     _end(work, body, command, heading, side)
-    for k in range(STATE_SIZE):
+    for k in range(state.shape[0]):
         state[k] = work[(k + 1) * INPUTS]
     for k in range(jacobian.shape[0]):
         place = (k + 1) * INPUTS

@@ -146,7 +146,7 @@ def _start(c, pitch, twist, pitch_rate, twist_rate, inter_leg_rate, given):
     )
     sin_a, cos_a = sine_cosine(pitch + c.tilt)
     sin_b, cos_b = sine_cosine(twist)
-    z, q, dq = middle_of_masses(c, sin_b, cos_b, c.offset_before)
+    z, q, dq = middle_of_masses(c, sin_b, cos_b, c.previous_offset)
     _, _, m11, m12, m22 = mass_matrix(c, sin_a, cos_a, sin_b, z, q, dq)
     rolls_back = (pitch_rate.real >= 0.0) & (dw.real >= 0.0)
     status = BACKWARD if rolls_back else FLYING
@@ -302,11 +302,11 @@ def _gravity_work(c, flight, x, b):
     """What gravity has done since the start of the step."""
     sin_a, cos_a = sine_cosine(flight.start_pitch + c.tilt)
     sin_b, cos_b = sine_cosine(flight.start_twist)
-    _, q, dq = middle_of_masses(c, sin_b, cos_b, c.offset_before)
+    _, q, dq = middle_of_masses(c, sin_b, cos_b, c.previous_offset)
     x0, y0, z0 = middle_position(c, flight.start_pitch, sin_a, cos_a, q, dq)
     sin_a, cos_a = sine_cosine(x + c.tilt)
     sin_b, cos_b = sine_cosine(b)
-    _, q, dq = middle_of_masses(c, sin_b, cos_b, c.offset_before)
+    _, q, dq = middle_of_masses(c, sin_b, cos_b, c.previous_offset)
     x1, y1, z1 = middle_position(c, x, sin_a, cos_a, q, dq)
     return c.gravity_x * (x1 - x0) + c.gravity_y * (y1 - y0) + c.gravity_z * (z1 - z0)
 
@@ -325,7 +325,7 @@ def _strike(c, heading, flight):
         held, x, sin_a, cos_a, sin_b, cos_b, new_x, new_sin_a, new_cos_a, sin_turn, cos_turn
     )
     new_w, new_v, before, after = impact(
-        held, sin_a, cos_a, sin_b, cos_b, w, v, c.offset_before, 0.0 * x,
+        held, sin_a, cos_a, sin_b, cos_b, w, v, c.previous_offset, 0.0 * x,
         new_sin_a, new_cos_a, new_sin_b, new_cos_b,
     )  # fmt: skip
     new_u = _new_inter_leg_rate(

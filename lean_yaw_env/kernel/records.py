@@ -39,11 +39,11 @@ class Body(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What the controller sets for one step; the masses move from ``offset_before`` to ``offset``."""
+    """What the controller sets for one step; the masses move from ``previous_offset`` to ``mass_offset``."""
 
     inter_leg_angle: float
-    offset: float
-    offset_before: float
+    mass_offset: float
+    previous_offset: float
 
 
 class Stance(NamedTuple):
@@ -62,7 +62,7 @@ class Stance(NamedTuple):
     cos_inter_leg: float
     ankle_stiffness: float
     ankle_damping: float
-    offset_before: float
+    previous_offset: float
     offset_change: float
     shift_rate: float  # one over the shift's duration
     friction_limit_squared: float
@@ -109,7 +109,7 @@ class Outcome(NamedTuple):
     displacement_x: float
     displacement_z: float
     heading_change: float
-    offset: float
+    mass_offset: float
     least_normal_force: float
     greatest_friction: float
     gravity_work: float

@@ -23,7 +23,7 @@ def mass_offset(stance, time):
     rest = 1.0 - s
     change = stance.offset_change
     rate = stance.shift_rate
-    offset = stance.offset_before + change * (s * s * s * (10.0 + s * (6.0 * s - 15.0)))
+    offset = stance.previous_offset + change * (s * s * s * (10.0 + s * (6.0 * s - 15.0)))
     offset_rate = change * rate * (30.0 * s * s * rest * rest)
     offset_acceleration = change * rate * rate * (60.0 * s * rest * (rest - s))
     return offset, offset_rate, offset_acceleration

@@ -72,8 +72,8 @@ def stance_of(body, command, heading, side):
         cos_inter_leg,
         body.ankle_stiffness,
         body.ankle_damping,
-        command.offset_before,
-        command.offset - command.offset_before,
+        command.previous_offset,
+        command.mass_offset - command.previous_offset,
         1.0 / body.shift_time,
         body.friction_limit * body.friction_limit,
         body.max_step_duration,
@@ -93,7 +93,7 @@ def start(stance, body, pitch, twist, pitch_rate, twist_rate):
     gap, gap_rate, gap_acceleration, upright = foot_gap(
         stance, sin_a, cos_a, sin_twist, cos_twist, pitch_rate, twist_rate, dw, dv
     )
-    z, q, dq = middle_of_masses(stance, sin_twist, cos_twist, stance.offset_before)
+    z, q, dq = middle_of_masses(stance, sin_twist, cos_twist, stance.previous_offset)
     _, _, m11, m12, m22 = mass_matrix(stance, sin_a, cos_a, sin_twist, z, q, dq)
 
     first = first_step_length(
@@ -224,7 +224,7 @@ def finish(stance, heading, flight):
 
     start_sin_a, start_cos_a = sine_cosine(flight.start_pitch + stance.tilt)
     start_sin_twist, start_cos_twist = sine_cosine(flight.start_twist)
-    _, q, dq = middle_of_masses(stance, start_sin_twist, start_cos_twist, stance.offset_before)
+    _, q, dq = middle_of_masses(stance, start_sin_twist, start_cos_twist, stance.previous_offset)
     x0, y0, z0 = middle_position(stance, flight.start_pitch, start_sin_a, start_cos_a, q, dq)
     _, q, dq = middle_of_masses(stance, sin_twist, cos_twist, offset)
     x1, y1, z1 = middle_position(stance, x, sin_a, cos_a, q, dq)

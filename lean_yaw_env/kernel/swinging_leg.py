@@ -28,7 +28,7 @@ def with_inter_leg_angle(c, inter_leg):
     return Stance(
         c.radius, c.tilt, c.sin_tilt, c.cos_tilt, c.half_axle, c.axle_inertia,
         c.gravity_x, c.gravity_y, c.gravity_z, sine, cosine,
-        c.ankle_stiffness, c.ankle_damping, c.offset_before, c.offset_change, c.shift_rate,
+        c.ankle_stiffness, c.ankle_damping, c.previous_offset, c.offset_change, c.shift_rate,
         c.friction_limit_squared, c.max_duration,
     )  # fmt: skip
 

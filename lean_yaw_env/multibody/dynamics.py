@@ -13,7 +13,7 @@ same matrix: momentum takes the place of force and impulses that of the multipli
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan, cos, hypot, inf, isfinite, pi, sin, tan
+from math import atan, cos, hypot, inf, pi, sin, tan
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from lean_yaw_env.multibody.kinematics import (
     rotation_y,
     rotation_z,
 )
+from lean_yaw_env.validation import require_number
 
 HIP_MASS = 0.5
 """Each of the two hip masses; together they are the unit of mass."""
@@ -50,16 +51,11 @@ class Body:
     foot_mass: float
 
     def __post_init__(self) -> None:
-        limits = {
-            "hip_width": (0.0 <= self.hip_width < inf, "a finite number >= 0"),
-            "foot_radius": (0.0 <= self.foot_radius < 1.0, "in [0, 1)"),
-            "ankle_tilt": (0.0 < self.ankle_tilt <= pi / 2, "in (0, pi/2]"),
-            "slope": (-pi / 2 < self.slope < pi / 2, "in (-pi/2, pi/2)"),
-            "foot_mass": (0.0 < self.foot_mass < inf, "a finite number > 0"),
-        }
-        for name, (is_allowed, allowed) in limits.items():
-            if not is_allowed:
-                raise ValueError(f"{name} must be {allowed}, got {getattr(self, name)!r}")
+        require_number("hip_width", self.hip_width, 0.0, inf, "[)")
+        require_number("foot_radius", self.foot_radius, 0.0, 1.0, "[)")
+        require_number("ankle_tilt", self.ankle_tilt, 0.0, pi / 2, "(]")
+        require_number("slope", self.slope, -pi / 2, pi / 2, "()")
+        require_number("foot_mass", self.foot_mass, 0.0, inf, "()")
 
     @property
     def gravity(self) -> Vector:
@@ -333,11 +329,3 @@ def exchange_roles(coordinates: Vector, stance_ankle: float) -> Vector:
     exchanged[STANCE_LEG], exchanged[SWING_LEG] = coordinates[SWING_LEG], coordinates[STANCE_LEG]
     exchanged[STANCE_ANKLE] = stance_ankle
     return exchanged
-
-
-def require_finite(name: str, values: tuple[float, ...]) -> None:
-    """Raise a ValueError that names the first value that is not a finite number."""
-    for index, value in enumerate(values):
-        if not isfinite(value):
-            where = f"{name}[{index}]" if len(values) > 1 else name
-            raise ValueError(f"{where} must be a finite number, got {value!r}")

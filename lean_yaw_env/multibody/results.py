@@ -15,8 +15,8 @@ FALLS = ("trip", "lift-off", "backward", "forward", "sideways", "no-heel-strike"
 class ForceExtremes:
     """Extremes over a step, on the samples of the integration; units as in `ContactForces`."""
 
-    least_normal: float
-    greatest_friction_demand: float
+    least_normal_force: float
+    greatest_friction: float
     greatest_yaw_torque: float
     greatest_hip_torque: float
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import copysign, inf, nan, sin, tan
+from math import copysign, inf, nan, pi, sin, tan
 from typing import Any, Literal
 
 import numpy as np
@@ -22,7 +22,6 @@ from lean_yaw_env.multibody.dynamics import (
     impact,
     place,
     rates_from_section,
-    require_finite,
 )
 from lean_yaw_env.multibody.kinematics import (
     LEAN,
@@ -35,6 +34,7 @@ from lean_yaw_env.multibody.kinematics import (
 from lean_yaw_env.multibody.phase import Phase, PhaseEnd, integrate
 from lean_yaw_env.multibody.results import ForceExtremes, MultibodyStep, Trajectory
 from lean_yaw_env.multibody.shift import Shift
+from lean_yaw_env.validation import require_array, require_choice, require_finite, require_number
 
 SwingMode = Literal["held", "passive"]
 
@@ -70,10 +70,8 @@ class MultibodyWalker(Body):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0.0 < self.shift_time < inf:
-            raise ValueError(f"shift_time must be a finite number > 0, got {self.shift_time!r}")
-        if not 1e-13 <= self.tolerance <= 1e-3:
-            raise ValueError(f"tolerance must be in [1e-13, 1e-3], got {self.tolerance!r}")
+        require_number("shift_time", self.shift_time, 0.0, inf, "()")
+        require_number("tolerance", self.tolerance, 1e-13, 1e-3)
 
     def step(
         self,
@@ -172,25 +170,16 @@ class MultibodyWalker(Body):
         swing: SwingMode = "held",
         swing_rate: float | None = None,
     ) -> tuple[Phase, Vector]:
-        if stance not in ("left", "right"):
-            raise ValueError(f"stance must be 'left' or 'right', got {stance!r}")
-        if swing not in ("held", "passive"):
-            raise ValueError(f"swing must be 'held' or 'passive', got {swing!r}")
-        is_held = swing == "held"
-        numbers = tuple(float(value) for value in state)
-        require_finite("state", numbers)
+        require_choice("stance", stance, ("left", "right"))
+        is_held = require_choice("swing", swing, ("held", "passive")) == "held"
+        numbers = tuple(require_array("state", state, (None,)).tolist())
         inter_leg_rate = _inter_leg_rate(numbers, is_held, swing_rate)
         before = mass_offset if previous_offset is None else previous_offset
-        for name, value in (
-            ("inter_leg_angle", inter_leg_angle),
-            ("mass_offset", mass_offset),
-            ("previous_offset", before),
-        ):
-            require_finite(name, (value,))
-        if is_held and not 0.0 < inter_leg_angle < np.pi:
-            raise ValueError(
-                f"inter_leg_angle of a held leg must be in (0, pi), got {inter_leg_angle!r}"
-            )
+        angle = "inter_leg_angle of a held leg" if is_held else "inter_leg_angle"
+        limits = (0.0, pi) if is_held else (-inf, inf)
+        require_number(angle, inter_leg_angle, *limits, "()")
+        require_finite("mass_offset", mass_offset)
+        require_finite("previous_offset", before)
         heading, pitch, ankle, pitch_rate, ankle_rate = numbers[:5]
         standing = Stance(1.0 if stance == "left" else -1.0, heading)
         phase = Phase(self, standing, Shift(before, mass_offset, self.shift_time), is_held)
@@ -211,8 +200,7 @@ def _inter_leg_rate(state: tuple[float, ...], is_held: bool, swing_rate: float |
     if len(state) == 6 and swing_rate is None:
         return state[5]
     if len(state) == 5 and swing_rate is not None:
-        require_finite("swing_rate", (swing_rate,))
-        return swing_rate
+        return require_finite("swing_rate", swing_rate)
     raise ValueError(
         "a passive step needs a state of 6 entries, or 5 entries and swing_rate; "
         f"got {len(state)} entries and swing_rate={swing_rate!r}"
@@ -221,8 +209,8 @@ def _inter_leg_rate(state: tuple[float, ...], is_held: bool, swing_rate: float |
 
 def _extremes(forces: tuple[ContactForces, ...]) -> ForceExtremes:
     return ForceExtremes(
-        least_normal=min(force.normal for force in forces),
-        greatest_friction_demand=max(force.friction_demand for force in forces),
+        least_normal_force=min(force.normal for force in forces),
+        greatest_friction=max(force.friction_demand for force in forces),
         greatest_yaw_torque=max(abs(force.yaw_torque) for force in forces),
         greatest_hip_torque=max(abs(force.hip_torque) for force in forces),
     )

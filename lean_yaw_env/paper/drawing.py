@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lean_yaw_env.rendering.picture import new_figure
+from lean_yaw_env.rendering.figures import new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,4 +65,4 @@ def shade_intervals(axes: Axes, x: Any, inside: Any, *, label: str) -> None:
 
 def picture_of(figure: Any) -> Callable[[Path], None]:
     """What draws a matplotlib figure into a file."""
-    return partial(figure.savefig, dpi=_DPI)
+    return partial(save_figure, figure, dpi=_DPI)

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
+from lean_yaw_env.files import write_text
 from lean_yaw_env.paper.checks import Check
-from lean_yaw_env.paper.reproduction import Reproduced, Reproduction, write_columns, write_text
+from lean_yaw_env.paper.reproduction import Reproduced, Reproduction, write_columns
 
 TITLE = "Skateboards, bicycles and three-dimensional walkers: the paper beside ours"
 _INTRODUCTION = (

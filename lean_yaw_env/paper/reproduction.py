@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from lean_yaw_env.errors import LeanYawError
-from lean_yaw_env.files import written_whole
+from lean_yaw_env.files import write_text
 from lean_yaw_env.paper.checks import VERDICTS, Check
 from lean_yaw_env.paper.registry import pieces_named
 from lean_yaw_env.paper.results import Columns, Piece, Result
@@ -117,8 +118,7 @@ def reproduce(
         picture = None
         if result.picture is not None:
             picture = folder / f"{piece.name}.png"
-            with written_whole(picture) as temporary:
-                result.picture(temporary)
+            result.picture(picture)
         done.append(Reproduced(piece, result, picture))
     return Reproduction(tuple(done))
 
@@ -131,16 +131,8 @@ def write_columns(path: Path, columns: Columns) -> None:
     ValueError
         If the columns have different lengths.
     """
-    with (
-        written_whole(path) as temporary,
-        temporary.open("w", newline="", encoding="utf-8") as file,
-    ):
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        writer.writerows(zip(*columns.values(), strict=True))
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all."""
-    with written_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    write_text(path, text.getvalue())

@@ -23,7 +23,7 @@ class Result:
     tables : mapping of file stems to columns
         Written as one CSV file each.
     picture : function or None
-        Draws the picture into a PNG file of the given path.
+        Writes the picture into a PNG file of the given path, whole or not at all.
     caption : str
         What the picture shows and what in it is our choice.
     """

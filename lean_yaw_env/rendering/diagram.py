@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lean_yaw_env.files import require_ending, written_whole
+from lean_yaw_env.files import require_ending
 from lean_yaw_env.parameters import Foot, Vector, WalkerParameters
 from lean_yaw_env.rendering.camera import upward
+from lean_yaw_env.rendering.figures import ENDINGS, new_figure, save_figure
 from lean_yaw_env.rendering.footprints import footprint_length, footprint_outlines
 from lean_yaw_env.rendering.geometry import LegShape, Pose, WalkerShape, walker_shape
 from lean_yaw_env.rendering.palette import (
@@ -25,7 +26,6 @@ from lean_yaw_env.rendering.palette import (
     mixed,
     unit_colour,
 )
-from lean_yaw_env.rendering.picture import ENDINGS, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 # A pose in which everything can be seen; no gait leans or turns so far.
 _HEADING, _STANCE_PITCH, _INTER_LEG_ANGLE, _LEAN, _MASS_OFFSET = 0.35, 0.2, 0.5, 0.25, 0.1
 _LEAST_SLOPE = 0.09  # a gait's own slope would look level
-_DPI = 150
 _INCHES = 2.9  # per leg length
 _HEIGHT = 1.45  # of each drawing, in leg lengths
 _AXIS_ABOVE, _AXIS_BELOW = 0.42, 0.14
@@ -54,7 +53,7 @@ def draw_walker(parameters: WalkerParameters, path: str | os.PathLike[str]) -> N
     gymnasium.error.DependencyNotInstalled
         If matplotlib is not installed.
     """
-    place = require_ending(path, ENDINGS)
+    require_ending(path, ENDINGS)
     widths = (1.7, 0.9 + parameters.hip_width, 1.0 + parameters.hip_width)
     figure = new_figure(_INCHES * sum(widths), _INCHES * _HEIGHT + 1.0)
     side, rear, top = figure.subplots(1, 3, width_ratios=widths)
@@ -66,8 +65,7 @@ def draw_walker(parameters: WalkerParameters, path: str | os.PathLike[str]) -> N
         axes.set_aspect("equal")
         axes.set_axis_off()
     figure.supxlabel(_caption(parameters), fontsize=10, color=unit_colour(INK))
-    with written_whole(place) as temporary:
-        figure.savefig(temporary, dpi=_DPI)
+    save_figure(figure, path)
 
 
 def _caption(parameters: WalkerParameters) -> str:

@@ -23,8 +23,8 @@ from lean_yaw_env.parameters import (
     WalkerParameters,
     require_foot,
     require_mass_offset,
-    require_number,
 )
+from lean_yaw_env.validation import require_array, require_number
 from lean_yaw_env.walker import OTHER_FOOT, SIDE
 
 FOOT_HALF_LENGTH = 0.16
@@ -35,28 +35,6 @@ FOOT_HALF_WIDTH = 0.04
 """Half width of the drawn cylinder; the model's is any that does not tip over (section 3)."""
 _ARC_POINTS = 13
 _LEAST_UPRIGHT = 1e-9  # below it the swing foot's axis is vertical, and no ankle angle lays it flat
-
-
-def require_finite(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Vector:
-    """Return finite numbers as a float array of ``shape`` (None: any length), or ``ValueError``."""
-    wanted = (
-        "("
-        + ", ".join("n" if n is None else str(n) for n in shape)
-        + ("," if len(shape) == 1 else "")
-        + ")"
-    )
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must hold numbers in shape {wanted}, not {value!r}") from error
-    fits = array.ndim == len(shape) and all(
-        n is None or n == m for n, m in zip(shape, array.shape, strict=True)
-    )
-    if not fits:
-        raise ValueError(f"{name} must have shape {wanted}, not {array.shape}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must hold finite numbers, not {value!r}")
-    return array
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,11 +67,11 @@ class Pose:
 
     def __post_init__(self) -> None:
         angle = require_number("inter_leg_angle", self.inter_leg_angle, -QUARTER_TURN, QUARTER_TURN)
-        object.__setattr__(self, "state", require_finite("state", self.state, (STATE_SIZE,)))
+        object.__setattr__(self, "state", require_array("state", self.state, (STATE_SIZE,)))
         object.__setattr__(self, "stance", require_foot(self.stance))
         object.__setattr__(self, "inter_leg_angle", angle)
         object.__setattr__(self, "mass_offset", require_mass_offset(self.mass_offset))
-        object.__setattr__(self, "contact", require_finite("contact", self.contact, (2,)))
+        object.__setattr__(self, "contact", require_array("contact", self.contact, (2,)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Colours of pictures and films; the colour-blind can tell left from right too."""
+"""Colours of pictures and films, chosen so that readers with any kind of colour blindness can tell them apart."""
 
 from __future__ import annotations
 
@@ -24,6 +24,30 @@ REFERENCE: Colour = (140, 110, 180)
 
 FOOT_COLOURS: dict[Foot, Colour] = {"left": LEFT, "right": RIGHT}
 
+# Okabe and Ito, "Color universal design" (2008), without yellow, which is too faint for a line on white
+BLACK: Colour = (0, 0, 0)
+ORANGE: Colour = (230, 159, 0)
+SKY_BLUE: Colour = (86, 180, 233)
+GREEN: Colour = (0, 158, 115)
+BLUE: Colour = (0, 114, 178)
+VERMILION: Colour = (213, 94, 0)
+PURPLE: Colour = (204, 121, 167)
+LIGHT_GREY: Colour = (192, 192, 192)
+
+AGENT_COLOURS: dict[str, Colour] = {
+    "random": LIGHT_GREY,
+    "fixed": BLACK,
+    "feedback": ORANGE,
+    "lqr": SKY_BLUE,
+    "mpc": GREEN,
+    "ppo": VERMILION,
+    "sac": PURPLE,
+    "apg": BLUE,
+}
+"""The colour of each agent, the same in every picture."""
+SERIES_COLOURS: tuple[Colour, ...] = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY_BLUE, BLACK)
+"""Of curves that are not agents, in this order; then another line style is needed."""
+
 
 def mixed(colour: Colour, other: Colour, share: float) -> Colour:
     """``colour`` with a share of another in it."""
@@ -34,6 +58,6 @@ def mixed(colour: Colour, other: Colour, share: float) -> Colour:
 
 
 def unit_colour(colour: Colour) -> tuple[float, float, float]:
-    """The same colour in parts of one."""
+    """The same colour in parts of one, as matplotlib takes it."""
     red, green, blue = (value / 255.0 for value in colour)
     return red, green, blue

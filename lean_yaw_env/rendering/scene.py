@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from lean_yaw_env.parameters import Foot, Vector, WalkerParameters, require_foot, require_number
-from lean_yaw_env.rendering.geometry import Pose, require_finite
+from lean_yaw_env.parameters import Foot, Vector, WalkerParameters, require_foot
+from lean_yaw_env.rendering.geometry import Pose
+from lean_yaw_env.validation import require_array, require_finite, require_number
 
 
 class Goal(NamedTuple):
@@ -70,27 +72,27 @@ class Scene:
 
     def __post_init__(self) -> None:
         if not isinstance(self.parameters, WalkerParameters):
-            raise ValueError(f"parameters must be WalkerParameters, not {self.parameters!r}")
+            raise ValueError(f"parameters must be WalkerParameters, got {self.parameters!r}")
         if not isinstance(self.pose, Pose):
-            raise ValueError(f"pose must be a Pose, not {self.pose!r}")
-        footprints = require_finite("footprints", self.footprints, (None, 2))
-        headings = require_finite("headings", self.headings, (len(footprints),))
+            raise ValueError(f"pose must be a Pose, got {self.pose!r}")
+        footprints = require_array("footprints", self.footprints, (None, 2))
+        headings = require_array("headings", self.headings, (len(footprints),))
         feet = tuple(require_foot(foot) for foot in self.feet)
         if len(feet) != len(footprints):
             raise ValueError(
-                f"feet must hold {len(footprints)}, one per footprint, not {len(feet)}"
+                f"feet must hold {len(footprints)}, one per footprint, got {len(feet)}"
             )
         object.__setattr__(self, "footprints", footprints)
         object.__setattr__(self, "headings", headings)
         object.__setattr__(self, "feet", feet)
-        object.__setattr__(self, "path", require_finite("path", self.path, (None, 2)))
+        object.__setattr__(self, "path", require_array("path", self.path, (None, 2)))
         object.__setattr__(self, "goals", tuple(_require_goal(goal) for goal in self.goals))
         object.__setattr__(self, "lines", tuple(str(line) for line in self.lines))
         if self.commanded_heading is not None:
-            heading = require_number("commanded_heading", self.commanded_heading, -1e6, 1e6)
+            heading = require_finite("commanded_heading", self.commanded_heading)
             object.__setattr__(self, "commanded_heading", heading)
         if self.reference_path is not None:
-            line = require_finite("reference_path", self.reference_path, (None, 2))
+            line = require_array("reference_path", self.reference_path, (None, 2))
             object.__setattr__(self, "reference_path", line)
 
     @property
@@ -129,11 +131,11 @@ def _require_goal(goal: Goal) -> Goal:
         downhill, right, radius, reached = goal
     except (TypeError, ValueError) as error:
         raise ValueError(
-            f"a goal must be (downhill, right, radius, reached), not {goal!r}"
+            f"a goal must be (downhill, right, radius, reached), got {goal!r}"
         ) from error
     return Goal(
-        require_number("goal's downhill", downhill, -1e6, 1e6),
-        require_number("goal's right", right, -1e6, 1e6),
-        require_number("goal's radius", radius, 0.0, 1e6, "(]"),
+        require_finite("goal's downhill", downhill),
+        require_finite("goal's right", right),
+        require_number("goal's radius", radius, 0.0, math.inf, "()"),
         bool(reached),
     )

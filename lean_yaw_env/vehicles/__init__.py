@@ -18,6 +18,7 @@ from lean_yaw_env.vehicles.bicycle_parameters import (
 from lean_yaw_env.vehicles.characteristic import CharacteristicPolynomial, DoubleRoot
 from lean_yaw_env.vehicles.eigenvalue_branches import (
     BRANCH_NAMES,
+    UNNAMED_BRANCHES,
     EigenvalueBranches,
     follow_eigenvalues,
 )
@@ -27,6 +28,7 @@ from lean_yaw_env.vehicles.stability import SpeedRange, critical_speed, stable_s
 __all__ = [
     "BENCHMARK_2007",
     "BRANCH_NAMES",
+    "UNNAMED_BRANCHES",
     "BicycleMotion",
     "BicycleParameters",
     "CanonicalMatrices",

@@ -16,19 +16,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lean_yaw_env.validation import require_array, require_finite, require_vector
 from lean_yaw_env.vehicles.bicycle_parameters import (
     BENCHMARK_2007,
     BicycleParameters,
     canonical_matrices,
 )
 from lean_yaw_env.vehicles.characteristic import CharacteristicPolynomial, DoubleRoot
-from lean_yaw_env.vehicles.linear_motion import (
-    ComplexArray,
-    FloatArray,
-    finite_vector,
-    linear_motion,
-    require_finite,
-)
+from lean_yaw_env.vehicles.linear_motion import ComplexArray, FloatArray, linear_motion
 from lean_yaw_env.vehicles.stability import SpeedRange, stable_speed_range
 
 _ROUND_OFF = 1e-9
@@ -81,11 +76,7 @@ class LinearBicycle:
     def __post_init__(self) -> None:
         names = ("mass_matrix", "damping_matrix", "static_stiffness", "dynamic_stiffness")
         for name in names:
-            matrix = np.array(getattr(self, name), dtype=np.float64)
-            if matrix.shape != (2, 2) or not np.all(np.isfinite(matrix)):
-                raise ValueError(
-                    f"{name} must be a (2, 2) matrix of finite numbers, got {matrix.tolist()}"
-                )
+            matrix = require_array(name, getattr(self, name), (2, 2))
             matrix.setflags(write=False)
             object.__setattr__(self, name, matrix)
         mass = self.mass_matrix
@@ -118,7 +109,7 @@ class LinearBicycle:
         ValueError
             If a speed is not finite.
         """
-        v = finite_vector("speeds", speeds)[:, None, None]
+        v = require_vector("speeds", speeds)[:, None, None]
         matrix = np.zeros((v.size, 4, 4))
         matrix[:, :2, 2:] = np.eye(2)
         stiffness = self.static_stiffness + v**2 * self.dynamic_stiffness
@@ -264,7 +255,7 @@ class LinearBicycle:
         """
         start = {"lean": lean, "steer": steer, "lean_rate": lean_rate, "steer_rate": steer_rate}
         state = np.array([require_finite(name, value) for name, value in start.items()])
-        samples = finite_vector("times", times)
+        samples = require_vector("times", times)
         matrix = self.state_matrix(require_finite("speed", speed))[0]
         return BicycleMotion(samples, *linear_motion(matrix, state, samples).T)
 

@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lean_yaw_env.vehicles.linear_motion import FloatArray, require_finite, require_within
+from lean_yaw_env.validation import require_finite, require_number
+from lean_yaw_env.vehicles.linear_motion import FloatArray
 
 _INERTIA_SLACK = 1e-9
 """Relative room left for round-off when a principal inertia equals the sum of the two others."""
@@ -46,9 +47,9 @@ class Wheel:
     inertia_yy: float
 
     def __post_init__(self) -> None:
-        require_within("wheel radius", self.radius, 0.0)
+        require_number("wheel radius", self.radius, 0.0, math.inf, "()")
         for name in ("mass", "inertia_xx", "inertia_yy"):
-            require_within(f"wheel {name}", getattr(self, name), 0.0, low_included=True)
+            require_number(f"wheel {name}", getattr(self, name), 0.0, math.inf, "[)")
         if self.inertia_yy > 2.0 * self.inertia_xx * (1.0 + _INERTIA_SLACK):
             raise ValueError(
                 f"wheel inertia_yy must be in [0, 2 * inertia_xx = {2.0 * self.inertia_xx:g}], "
@@ -85,7 +86,7 @@ class FrameBody:
     inertia_zz: float
 
     def __post_init__(self) -> None:
-        require_within("frame mass", self.mass, 0.0, low_included=True)
+        require_number("frame mass", self.mass, 0.0, math.inf, "[)")
         for name in ("x", "z", "inertia_xx", "inertia_xz", "inertia_yy", "inertia_zz"):
             require_finite(f"frame {name}", getattr(self, name))
         plane = np.array([[self.inertia_xx, self.inertia_xz], [self.inertia_xz, self.inertia_zz]])
@@ -135,12 +136,14 @@ class BicycleParameters:
     front_wheel: Wheel = field(default_factory=lambda: Wheel(0.35, 3.0, 0.1405, 0.28))
 
     def __post_init__(self) -> None:
-        require_within("wheelbase", self.wheelbase, 0.0)
+        require_number("wheelbase", self.wheelbase, 0.0, math.inf, "()")
         require_finite("trail", self.trail)
-        require_within("steer_axis_tilt", self.steer_axis_tilt, -math.pi / 2, math.pi / 2)
-        require_within("gravity", self.gravity, 0.0)
+        require_number("steer_axis_tilt", self.steer_axis_tilt, -math.pi / 2, math.pi / 2, "()")
+        require_number("gravity", self.gravity, 0.0, math.inf, "()")
         front_mass = self.front_frame.mass + self.front_wheel.mass
-        require_within("mass of front_frame and front_wheel together", front_mass, 0.0)
+        require_number(
+            "mass of front_frame and front_wheel together", front_mass, 0.0, math.inf, "()"
+        )
 
 
 BENCHMARK_2007 = BicycleParameters()

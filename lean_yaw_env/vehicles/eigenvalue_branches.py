@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import pairwise, permutations
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lean_yaw_env.validation import require_vector
 from lean_yaw_env.vehicles.bicycle import LinearBicycle
-from lean_yaw_env.vehicles.linear_motion import ComplexArray, FloatArray, finite_vector
+from lean_yaw_env.vehicles.linear_motion import ComplexArray, FloatArray
 
 BRANCH_NAMES = ("weave_upper", "weave_lower", "capsize", "caster")
 """Order of the branches. The weave is two branches: a conjugate pair, positive frequency first, or
 at low speed two real roots, the greater first."""
+
+UNNAMED_BRANCHES = ("mode_1", "mode_2", "mode_3", "mode_4")
+"""Of a bicycle that at no speed has one oscillation and two real roots. Order: at the speed where the branches
+start, oscillations before real roots, each by falling real part."""
 
 _ASSIGNMENTS = np.array(list(permutations(range(4))))
 _CLEAR = 0.3
@@ -23,12 +28,16 @@ _LONGEST_STEP = 0.05
 """Of the speed followed in one go, relative to the speed itself."""
 _SHORTEST_STEP = 1e-7
 """Relative step below which two modes are taken as meeting: which is which has no meaning then."""
+_SAME = 1e-7
+"""Eigenvalues closer than this, relative to the greatest, are one and the same: round-off's square root is 1e-8."""
 
 
 @dataclass(frozen=True, eq=False)
 class EigenvalueBranches:
-    """Eigenvalues against speed, one column for each mode, in the order of ``BRANCH_NAMES``."""
+    """Eigenvalues against speed, one column for each mode."""
 
+    names: tuple[str, ...]
+    """Of the columns: ``BRANCH_NAMES``, or ``UNNAMED_BRANCHES`` where those names have no meaning."""
     speeds: FloatArray
     """Shape (n,), m / s."""
     eigenvalues: ComplexArray
@@ -39,22 +48,30 @@ class EigenvalueBranches:
     @property
     def weave(self) -> ComplexArray:
         """Both weave eigenvalues, shape (n, 2), 1 / s."""
-        return self.eigenvalues[:, :2]
+        return self._named("weave_upper", "weave_lower")
 
     @property
     def capsize(self) -> ComplexArray:
         """Shape (n,), 1 / s; real unless it has joined another mode's pair."""
-        return self.eigenvalues[:, 2]
+        return self._named("capsize")[:, 0]
 
     @property
     def caster(self) -> ComplexArray:
         """Shape (n,), 1 / s; real unless it has joined another mode's pair."""
-        return self.eigenvalues[:, 3]
+        return self._named("caster")[:, 0]
 
     @property
     def is_weave_oscillatory(self) -> np.ndarray:
         """Whether the weave is a complex pair, shape (n,), bool."""
         return np.all(self.weave.imag != 0.0, axis=1)
+
+    def _named(self, *names: str) -> ComplexArray:
+        if self.names != BRANCH_NAMES:
+            raise ValueError(
+                "this bicycle's modes have no names: at no speed does it have one oscillation and two real "
+                "eigenvalues; read the columns of eigenvalues"
+            )
+        return self.eigenvalues[:, [BRANCH_NAMES.index(name) for name in names]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +82,11 @@ class _Modes:
     eigenvalues: ComplexArray
     shapes: ComplexArray
 
+    def has_equal(self) -> bool:
+        """Whether two eigenvalues are the same, so that no step is small enough to tell them apart."""
+        gaps = np.abs(self.eigenvalues[:, None] - self.eigenvalues[None, :])[np.triu_indices(4, 1)]
+        return bool(gaps.min() <= _SAME * np.max(np.abs(self.eigenvalues)))
+
 
 def follow_eigenvalues(bicycle: LinearBicycle, speeds: ArrayLike) -> EigenvalueBranches:
     """Follow the four eigenvalues of a bicycle in the speed, each under its mode's name.
@@ -72,7 +94,8 @@ def follow_eigenvalues(bicycle: LinearBicycle, speeds: ArrayLike) -> EigenvalueB
     The names are given where they are beyond doubt, at a speed with one oscillation and two real
     roots: the oscillation is the weave, of the real roots the greater is the capsize mode and the
     lesser the caster mode. From there each mode is followed up and down, in steps small enough
-    that the assignment of old to new eigenvalues and mode shapes is clearly the cheapest.
+    that the assignment of old to new eigenvalues and mode shapes is clearly the cheapest. A bicycle
+    without such a speed has branches without names.
 
     Parameters
     ----------
@@ -83,13 +106,10 @@ def follow_eigenvalues(bicycle: LinearBicycle, speeds: ArrayLike) -> EigenvalueB
     Raises
     ------
     ValueError
-        If a speed is negative or not finite, or the bicycle has no speed at which its modes can be
-        named.
+        If a speed is negative or not finite.
     """
-    requested = finite_vector("speeds", speeds)
-    if np.any(requested < 0.0):
-        raise ValueError(f"speeds must be in [0, inf), got {requested.min()!r}")
-    start = _name_modes(bicycle)
+    requested = require_vector("speeds", speeds, 0.0, math.inf, "[)")
+    start, names = _start(bicycle)
     ordered, place = np.unique(requested, return_inverse=True)
     found: dict[float, _Modes] = {}
     for side in (ordered[ordered >= start.speed], ordered[ordered < start.speed][::-1]):
@@ -100,31 +120,37 @@ def follow_eigenvalues(bicycle: LinearBicycle, speeds: ArrayLike) -> EigenvalueB
             found[float(speed)] = _follow_to(bicycle, modes, float(speed))
     rows = [found[float(speed)] for speed in ordered[place.reshape(-1)]]
     return EigenvalueBranches(
+        names=names,
         speeds=requested,
         eigenvalues=np.array([row.eigenvalues for row in rows]),
         mode_shapes=np.array([row.shapes for row in rows]),
     )
 
 
-def _name_modes(bicycle: LinearBicycle) -> _Modes:
-    """Modes at a speed with one complex pair and two real roots, in the order of the names."""
-    weave_speed = bicycle.weave_speed()
+def _start(bicycle: LinearBicycle) -> tuple[_Modes, tuple[str, ...]]:
+    """Modes at a speed with one complex pair and two real roots, in the order of the names.
+
+    The number of real roots changes only where two real ones meet, so one speed of each range between those
+    speeds is enough. The fastest range is tried first. Where none will do, the modes there have no names.
+    """
     scale = bicycle.characteristic.speed_scale
+    borders = [0.0, *(meeting.speed for meeting in bicycle.double_roots())]
+    weave_speed = bicycle.weave_speed()
     trials = [] if weave_speed is None else [weave_speed]
-    for speed in [*trials, *(scale * np.geomspace(10.0, 0.1, 41))]:
-        values, shapes = bicycle.modes(speed)
-        real = np.flatnonzero(values.imag == 0.0)
-        if real.size == 2:
-            pair = np.flatnonzero(values.imag != 0.0)
-            order = [
-                *pair[np.argsort(-values[pair].imag)],
-                *real[np.argsort(-values[real].real)],
-            ]
-            return _Modes(float(speed), values[order], shapes[order])
-    raise ValueError(
-        "the modes cannot be named: no speed was found with one oscillating mode and two real "
-        f"eigenvalues, up to {10.0 * scale:g} m/s"
-    )
+    trials += [max(2.0 * borders[-1], scale)]
+    trials += [0.5 * (low + high) for low, high in pairwise(borders)][::-1]
+    for speed in trials:
+        modes = _sorted_modes(bicycle, speed)
+        if np.sum(modes.eigenvalues.imag == 0.0) == 2:
+            return modes, BRANCH_NAMES
+    return _sorted_modes(bicycle, trials[0]), UNNAMED_BRANCHES
+
+
+def _sorted_modes(bicycle: LinearBicycle, speed: float) -> _Modes:
+    """The modes at a speed: first oscillations, then real ones, each by falling real part, of a pair the positive frequency first."""
+    values, shapes = bicycle.modes(speed)
+    order = np.lexsort((-values.imag, -values.real, values.imag == 0.0))
+    return _Modes(float(speed), values[order], shapes[order])
 
 
 def _follow_to(bicycle: LinearBicycle, modes: _Modes, speed: float) -> _Modes:
@@ -144,7 +170,7 @@ def _step(bicycle: LinearBicycle, modes: _Modes, speed: float) -> _Modes:
     step = float(np.clip(speed - modes.speed, -longest, longest))
     whole = abs(speed - modes.speed) <= longest
     following, is_clear = _assign(bicycle, modes, speed if whole else modes.speed + step)
-    while not is_clear and abs(step) > _SHORTEST_STEP * longest:
+    while not (is_clear or modes.has_equal()) and abs(step) > _SHORTEST_STEP * longest:
         step *= 0.5
         following, is_clear = _assign(bicycle, modes, modes.speed + step)
     return following
@@ -156,7 +182,9 @@ def _assign(bicycle: LinearBicycle, modes: _Modes, speed: float) -> tuple[_Modes
     All 24 assignments are priced, for the runner-up's cost tells how clear the best one is.
     """
     values, shapes = bicycle.modes(speed)
-    distance = np.abs(modes.eigenvalues[:, None] - values[None, :]) / np.max(np.abs(values))
+    distance = np.abs(modes.eigenvalues[:, None] - values[None, :]) / (
+        np.max(np.abs(values)) or 1.0
+    )
     likeness = np.abs(modes.shapes.conj() @ shapes.T)
     cost = distance + 1.0 - np.minimum(likeness, 1.0)
     totals = cost[np.arange(4), _ASSIGNMENTS].sum(axis=1)

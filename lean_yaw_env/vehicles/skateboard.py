@@ -15,14 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lean_yaw_env.vehicles.linear_motion import (
-    ComplexArray,
-    FloatArray,
-    finite_vector,
-    linear_motion,
-    require_finite,
-    require_within,
-)
+from lean_yaw_env.validation import require_finite, require_number, require_vector
+from lean_yaw_env.vehicles.linear_motion import ComplexArray, FloatArray, linear_motion
 from lean_yaw_env.vehicles.stability import SpeedRange, stable_speed_range
 
 
@@ -100,10 +94,10 @@ class Skateboard:
 
     def __post_init__(self) -> None:
         for name in ("mass", "rider_height", "wheelbase", "gravity"):
-            require_within(name, getattr(self, name), 0.0)
-        require_within("steering_tilt", self.steering_tilt, 0.0, math.pi / 2)
+            require_number(name, getattr(self, name), 0.0, math.inf, "()")
+        require_number("steering_tilt", self.steering_tilt, 0.0, math.pi / 2, "()")
         for name in ("spring_stiffness", "damping"):
-            require_within(name, getattr(self, name), 0.0, low_included=True)
+            require_number(name, getattr(self, name), 0.0, math.inf, "[)")
 
     def curvature_per_lean(self) -> float:
         """Curvature of the path for a unit lean, 1 / (r_c theta) = 2 / (w tan alpha), 1/m."""
@@ -177,7 +171,7 @@ class Skateboard:
         ValueError
             If a speed is not finite.
         """
-        pairs = [_roots(self.equation_of_motion(v)) for v in finite_vector("speeds", speeds)]
+        pairs = [_roots(self.equation_of_motion(v)) for v in require_vector("speeds", speeds)]
         return np.array(pairs, dtype=np.complex128)
 
     def critical_speed(self) -> float:
@@ -214,7 +208,7 @@ class Skateboard:
         start = np.array(
             [require_finite("lean", lean), require_finite("lean_rate", lean_rate), 0.0, 0.0]
         )
-        samples = finite_vector("times", times)
+        samples = require_vector("times", times)
         # Rows: lean, lean rate, heading (yaw rate = v / r_c), lateral position (v * heading).
         matrix = np.array(
             [

@@ -8,58 +8,98 @@ fall is a cliff, whose height no derivative of the steps before shows, but the c
 from __future__ import annotations
 
 import copy
-from dataclasses import replace
-from typing import NamedTuple
+import math
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.optim import Adam
+from torch.utils.tensorboard import SummaryWriter
 
-from agents.learning.checkpoint import Arrays, refused_as_another_s
-from agents.learning.gradient.networks import Critic, make_policy
-from agents.learning.gradient.returns import Window, time_discounted_returns
-from agents.learning.gradient.settings import GradientSettings
-from agents.learning.gradient.walkers import DifferentiableWalkers, Walked
-from agents.policies.storage import task_of
-from agents.seeds import training_seed
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
+from lean_yaw_env.validation import require_number
+
+from ...policies.storage import task_of
+from ...seeds import training_seed
+from ..learner import LearnerSettings, optimizer_arrays, restore_optimizer
+from ..recorder import Arrays, EndedEpisode, Recorder, restoring, under
+from .networks import Critic, layer_weights, make_policy
+from .returns import Window, time_discounted_returns
+from .walkers import DifferentiableWalkers, Walked
 
 _BETAS = (0.7, 0.95)
 """Adam's, as Xu et al. (2022) have them: exact gradients need less averaging than sampled ones."""
 
 
-class Ended(NamedTuple):
-    """An episode that has ended."""
-
-    steps: int
-    value: float
-    length: int
-    survived: bool
-
-
-class Learner:
-    """Walkers, networks and optimisers of a training.
-
-    Parameters
-    ----------
-    env_id, settings, seed, options, threads : as ``train_gradient``
+@dataclass(frozen=True)
+class GradientSettings(LearnerSettings):
+    """Settings of the short-horizon analytic policy gradient, with those of ``LearnerSettings``; layers are tanh.
 
     Attributes
     ----------
-    steps : environment steps done, over all walkers
+    window : steps that gradients flow through, between two updates of the policy
+    critic_learning_rate : of the critic's Adam, at the start; it falls as the policy's does
+    critic_epochs : passes over the window's samples for each update
+    critic_batches : gradient steps of the critic in a pass
+    critic_first : steps before the policy is first changed, in which the critic learns what walking is worth
+        From a critic that knows nothing yet, a policy learns to hurry or to dawdle, and some never unlearn it.
+    critic_memory : share of the target critic that stays at each update; it gives the values that returns end in
+    trace : lambda of the returns: 1 looks at the critic only where a window ends, 0 after every step
+    exploration : standard deviation of what is added to actions
+    largest_gradient : norm that gradients are clipped to
     """
 
+    steps: int = 100_000
+    walkers: int = 64
+    time_constant: float = 12.0
+    window: int = 32
+    critic_learning_rate: float = 3e-3
+    critic_epochs: int = 4
+    critic_batches: int = 8
+    critic_first: int = 16_000
+    critic_memory: float = 0.8
+    trace: float = 0.99
+    exploration: float = 0.05
+    largest_gradient: float = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require_counts("window", "critic_epochs", "critic_batches")
+        self.require_counts("critic_first", low=0)
+        self.require_shares("critic_memory", "trace")
+        self.require_positive("critic_learning_rate", "largest_gradient")
+        require_number("exploration", self.exploration, 0.0, 10.0, "(]")
+        samples = self.walkers * self.window
+        if samples % self.critic_batches:
+            raise ValueError(
+                f"critic_batches must divide the {samples} samples of a window, got {self.critic_batches}"
+            )
+
+
+class GradientLearner:
+    """Walkers, networks and optimisers of a training; see ``learner.Learner``."""
+
+    activation = "tanh"
+    output = "clip"
+
     def __init__(
-        self, env_id: str, settings: GradientSettings, seed: int, options: EnvOptions, threads: int
+        self,
+        env_id: str,
+        settings: GradientSettings,
+        seed: int,
+        options: EnvOptions,
+        threads: int,
+        tensorboard: Path | None = None,
     ) -> None:
-        if settings.push_level is not None:
-            options = replace(options, push_level=settings.push_level)
         self.settings = settings
+        self._tensorboard = tensorboard
         self.steps = 0
         self.generator = torch.Generator().manual_seed(seed)
         self.walkers = DifferentiableWalkers(
-            task_of(env_id), options, settings.walkers, threads=threads
+            task_of(env_id), settings.walked_under(options), settings.walkers, threads=threads
         )
         features = self.walkers.reset(training_seed(seed)).shape[1]
         self.policy = make_policy(features, ACTION_SIZE, settings.hidden, self.generator)
@@ -68,7 +108,30 @@ class Learner:
         self.policy_optimizer = _adam(self.policy, settings.learning_rate)
         self.critic_optimizer = _adam(self.critic, settings.critic_learning_rate)
 
-    def update(self) -> list[Ended]:
+    def learn(self, recorder: Recorder) -> None:
+        """Train to the end; see ``Learner``."""
+        writer = None if self._tensorboard is None else SummaryWriter(str(self._tensorboard))
+        while self.steps < self.settings.steps:
+            ended = self.update()
+            for episode in ended:
+                recorder.add(episode)
+            recorder.between_updates(self.steps)
+            if writer is not None and ended:
+                writer.add_scalar("rollout/ep_rew_mean", recorder.recent_return(), self.steps)
+        if writer is not None:
+            writer.close()
+
+    def weights(self) -> dict[str, NDArray[np.float32]]:
+        """The policy's numbers. Observations come scaled already: their statistics are those that change nothing."""
+        features = self.walkers.observations.shape[1]
+        deviation = math.log(self.settings.exploration)
+        return layer_weights(self.policy) | {
+            "observation_mean": np.zeros(features, dtype=np.float32),
+            "observation_variance": np.ones(features, dtype=np.float32),
+            "log_std": np.full(ACTION_SIZE, deviation, dtype=np.float32),
+        }
+
+    def update(self) -> list[EndedEpisode]:
         """Walk a window, improve policy and critic by it, and return the episodes that ended in it."""
         self._set_learning_rates()
         window, ended = self._walk()
@@ -91,20 +154,19 @@ class Learner:
         for name, network in self._networks().items():
             arrays |= {f"{name}.{k}": v.numpy().copy() for k, v in network.state_dict().items()}
         for name, optimizer in self._optimizers().items():
-            for index, slots in optimizer.state_dict()["state"].items():
-                arrays |= {f"{name}.{index}.{k}": v.numpy().copy() for k, v in slots.items()}
+            arrays |= {f"{name}.{k}": v for k, v in optimizer_arrays(optimizer).items()}
         return arrays | {f"walkers.{k}": v for k, v in self.walkers.snapshot().items()}
 
     def restore(self, arrays: Arrays) -> None:
         """Bring a learner that was made with the same settings to a captured state, or raise ``CheckpointError``."""
-        with refused_as_another_s():
+        with restoring():
             for name, network in self._networks().items():
                 network.load_state_dict(
                     {k: torch.from_numpy(arrays[f"{name}.{k}"]) for k in network.state_dict()}
                 )
             for name, optimizer in self._optimizers().items():
-                _restore_optimizer(optimizer, _under(name, arrays))
-            self.walkers.restore(_under("walkers", arrays))
+                restore_optimizer(optimizer, under(f"{name}.", arrays))
+            self.walkers.restore(under("walkers.", arrays))
             self.steps = int(arrays["count.steps"])
             self.generator.set_state(torch.from_numpy(arrays["random.torch"].copy()))
 
@@ -117,12 +179,12 @@ class Learner:
             "critic_optimizer": self.critic_optimizer,
         }
 
-    def _walk(self) -> tuple[Window, list[Ended]]:
+    def _walk(self) -> tuple[Window, list[EndedEpisode]]:
         """A window of steps by the policy, explored around."""
         self.walkers.cut()
         observations: list[Tensor] = []
         steps: list[Walked] = []
-        ended: list[Ended] = []
+        ended: list[EndedEpisode] = []
         for _ in range(self.settings.window):
             observed = self.walkers.observations
             walked = self.walkers.step(self._act(observed))
@@ -174,24 +236,11 @@ def _adam(network: nn.Module, learning_rate: float) -> Adam:
     return Adam(network.parameters(), learning_rate, _BETAS, fused=True)
 
 
-def _under(name: str, arrays: Arrays) -> Arrays:
-    """The arrays whose names begin so, without that beginning."""
-    prefix = f"{name}."
-    return {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
-
-
-def _restore_optimizer(optimizer: Adam, arrays: Arrays) -> None:
-    state: dict[int, dict[str, Tensor]] = {}
-    for name, value in arrays.items():
-        index, slot = name.split(".")
-        state.setdefault(int(index), {})[slot] = torch.from_numpy(value.copy())
-    groups = optimizer.state_dict()["param_groups"]
-    optimizer.load_state_dict({"state": state, "param_groups": groups})
-
-
-def _ended(walked: Walked, steps: int) -> list[Ended]:
+def _ended(walked: Walked, steps: int) -> list[EndedEpisode]:
     """The episodes that a step ended."""
     return [
-        Ended(steps, float(walked.returns[i]), int(walked.lengths[i]), bool(walked.truncated[i]))
+        EndedEpisode(
+            steps, float(walked.returns[i]), int(walked.lengths[i]), bool(walked.truncated[i])
+        )
         for i in torch.nonzero(walked.terminated | walked.truncated).flatten().tolist()
     ]

@@ -1,0 +1,138 @@
+"""README and docs: their code runs, their links lead somewhere, and numbers that they take from the code are the code's."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.kernel.flight import (
+    BACKWARD_RATE,
+    LANDING_WINDOW,
+    LEAST_INDEPENDENCE,
+    SHIFTING_LANDING_WINDOW,
+)
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PYTHON_BLOCK = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+FENCED = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
+LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
+
+
+def _program(page: str) -> str:
+    """The page's Python blocks, each on its own lines of the page, so that a traceback names the page's line."""
+    lines = [""] * len(page.split("\n"))
+    for block in PYTHON_BLOCK.finditer(page):
+        first = page[: block.start(1)].count("\n")
+        body = block[1].split("\n")
+        lines[first : first + len(body)] = body
+    return "\n".join(lines)
+
+
+def _anchor(heading: str) -> str:
+    """The anchor that GitHub gives a heading."""
+    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+
+
+def _anchors(page: Path) -> set[str]:
+    text = FENCED.sub("", page.read_text(encoding="utf-8"))
+    return {_anchor(heading) for heading in re.findall(r"^#+ (.*)$", text, re.MULTILINE)}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_code_of_a_page_runs_from_top_to_bottom(page: Path, tmp_path: Path) -> None:
+    program = _program(page.read_text(encoding="utf-8"))
+    if not program.strip():
+        pytest.skip("no code")
+    script = tmp_path / f"{page.stem}.py"
+    script.write_text(program, encoding="utf-8")
+    paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(paths),
+        "MPLBACKEND": "agg",
+        "SDL_VIDEODRIVER": "dummy",
+    }
+    result = subprocess.run(
+        [sys.executable, script], cwd=tmp_path, env=environment, capture_output=True, text=True
+    )
+    assert result.returncode == 0, result.stderr[-3000:]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_links_of_a_page_lead_somewhere(page: Path) -> None:
+    text = FENCED.sub("", page.read_text(encoding="utf-8"))
+    for target in LINK.findall(text):
+        if re.match(r"https?://", target):
+            continue
+        file, _, anchor = target.partition("#")
+        place = page.parent / file if file else page
+        assert place.exists(), f"{target} is not there"
+        if anchor:
+            assert anchor in _anchors(place), f"{target} has no such heading"
+
+
+def test_the_page_of_the_model_states_the_thresholds_of_the_code() -> None:
+    text = (ROOT / "docs" / "model.md").read_text(encoding="utf-8")
+    assert rf"$\dot\theta \ge {BACKWARD_RATE:g}$" in text
+    assert LEAST_INDEPENDENCE == 1e-3
+    assert r"\le 10^{-3} M_{11} M_{22}" in text
+    assert (
+        f"within {LANDING_WINDOW:g} units of time ({SHIFTING_LANDING_WINDOW:g} while the masses move"
+        in text
+    )
+
+
+def _readme_results() -> list[tuple[str, str, str]]:
+    """(task, agent, cell) of the README's table of results."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    lines = text.split("| task | mean |")[1].split("\n\n")[0].splitlines()
+    agents = [name.strip() for name in lines[0].strip("|").split("|")]
+    cells = []
+    for line in lines[2:]:
+        task, _, *values = [cell.strip() for cell in line.strip("|").split("|")]
+        cells += [(task, agent, cell) for agent, cell in zip(agents, values, strict=True)]
+    return cells
+
+
+def test_results_in_the_readme_are_those_of_the_leaderboard() -> None:
+    with (ROOT / "docs" / "leaderboard.csv").open(encoding="utf-8") as file:
+        rows = {(row["task"], row["agent"], row["metric"]): row for row in csv.DictReader(file)}
+    for task, agent, cell in _readme_results():
+        row = rows.get((task, agent, task_named(task).headline))
+        assert (row is None) == (cell == ""), (task, agent)
+        if row is not None:
+            bold = row["verdict"] == "better"
+            mean = float(row["mean"])
+            text = (
+                f"{100 * mean:.1f} %"
+                if task == "Push"
+                else f"{mean:.{2 if task == 'Waypoint' else 1}f}"
+            )
+            assert cell == (f"**{text}**" if bold else text), (task, agent)
+
+
+def test_speeds_in_the_readme_are_those_measured() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    kept = json.loads((ROOT / "benchmarks/results/full.json").read_text(encoding="utf-8"))
+    million = 1e-6
+    ppo = kept["training_collecting"] + kept["training_update"]
+    for part in (
+        f"{million * kept['batch_steps_per_second']:.1f} million walking steps per second, "
+        f"{round(kept['batch_over_solve_ivp'], -2):,.0f} times",
+        f"{million * kept['vector_1024_fixed_steps_per_second']:.1f} million steps per second, "
+        f"{kept['vector_over_sync_cartpole']:.0f} times",
+        f"{million * kept['vector_1024_random_steps_per_second']:.1f} million steps per second, "
+        f"{kept['random_vector_over_sync_cartpole']:.0f} times",
+        f"{kept['single_call']:.1f} µs; {kept['jacobian_call']:.0f} µs; {kept['step_heading']:.1f} µs",
+        f"{ppo:.0f} µs per step, of which the gradient updates take {kept['training_update']:.0f} µs",
+    ):
+        assert part in text

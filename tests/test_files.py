@@ -1,0 +1,90 @@
+"""Files written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from lean_yaw_env.files import require_ending, write_text, written_whole
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX modes")
+@pytest.mark.parametrize(("mask", "mode"), [(0o022, 0o644), (0o077, 0o600), (0o002, 0o664)])
+def test_a_new_file_has_the_mode_that_the_umask_gives(tmp_path: Path, mask: int, mode: int) -> None:
+    before = os.umask(mask)
+    try:
+        write_text(tmp_path / "new.txt", "words")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "new.txt").stat().st_mode & 0o777 == mode
+
+
+def test_text_is_written_as_it_is(tmp_path: Path) -> None:
+    write_text(tmp_path / "new.txt", "é\r\nn\n")
+    assert (tmp_path / "new.txt").read_bytes() == b"\xc3\xa9\r\nn\n"
+    assert [file.name for file in tmp_path.iterdir()] == ["new.txt"]
+
+
+def test_an_error_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "kept.txt"
+    write_text(path, "old")
+
+    def fail_half_way() -> None:
+        with written_whole(path) as temporary:
+            temporary.write_text("new")
+            raise RuntimeError("half way")
+
+    with pytest.raises(RuntimeError, match="half way"):
+        fail_half_way()
+    assert path.read_text() == "old"
+    assert [file.name for file in tmp_path.iterdir()] == ["kept.txt"]
+
+
+def test_the_file_is_unchanged_until_the_block_ends(tmp_path: Path) -> None:
+    path = tmp_path / "kept.txt"
+    write_text(path, "old")
+    with written_whole(path) as temporary:
+        temporary.write_text("new")
+        assert path.read_text() == "old"
+        assert temporary.suffix == ".txt"  # by which writers of pictures know the format
+    assert path.read_text() == "new"
+
+
+def test_what_a_killed_process_left_is_removed_by_the_next_write(tmp_path: Path) -> None:
+    path, other = tmp_path / "kept.txt", tmp_path / "other.txt"
+    killed = (
+        "import os, signal, sys\n"
+        "from pathlib import Path\n"
+        "from lean_yaw_env.files import written_whole\n"
+        "with written_whole(Path(sys.argv[1])) as temporary:\n"
+        "    temporary.write_text('half')\n"
+        "    os._exit(1)\n"
+    )
+    for left in (path, other):
+        subprocess.run([sys.executable, "-c", killed, str(left)], check=False)
+    assert len(list(tmp_path.iterdir())) == 2
+    write_text(path, "whole")
+    # The other file's remains wait for the next write of that file
+    assert len(list(tmp_path.iterdir())) == 2
+    write_text(other, "whole")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["kept.txt", "other.txt"]
+
+
+def test_a_write_leaves_the_unfinished_one_of_a_running_process_alone(tmp_path: Path) -> None:
+    path = tmp_path / "kept.txt"
+    with written_whole(path) as first:
+        first.write_text("first")
+        write_text(path, "second")
+        assert first.read_text() == "first"
+    assert path.read_text() == "first"
+
+
+@pytest.mark.parametrize("name", ["folder/picture.txt", "picture", "missing/picture.png"])
+def test_a_path_that_cannot_be_written_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ValueError, match="path must"):
+        require_ending(tmp_path / name, (".png",))
+    assert require_ending(tmp_path / "picture.PNG", (".png",)).name == "picture.PNG"
