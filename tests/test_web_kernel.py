@@ -178,7 +178,7 @@ def test_a_walk_ends_after_the_same_steps_with_the_same_bits():
                 counts[i] = k
                 break
             row[at + len(Command._fields) : -1] = outcome[:5]
-            row[at + Command._fields.index("offset_before")] = outcome.offset
+            row[at + Command._fields.index("previous_offset")] = outcome.mass_offset
             row[-1] = -row[-1]
             counts[i] = k + 1
     ours = run_module("walker_walk", rows, size + 1, str(n), f"@{size}")

@@ -42,8 +42,8 @@ PASSIVE_ROW = PASSIVE_SIDE + 1
 _OUTCOME = len(Outcome._fields)
 _PASSIVE_OUTCOME = len(PassiveOutcome._fields)
 _STATUS = Outcome._fields.index("status")
-_IN_FORCE = Outcome._fields.index("offset")
-_BEFORE = BODY + Command._fields.index("offset_before")
+_IN_FORCE = Outcome._fields.index("mass_offset")
+_BEFORE = BODY + Command._fields.index("previous_offset")
 _PASSIVE_STATUS = PassiveOutcome._fields.index("status")
 _SWING = PassiveOutcome._fields.index("inter_leg_angle")
 

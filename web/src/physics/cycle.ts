@@ -48,7 +48,7 @@ if (STATE_ROWS.some((k) => OUTPUTS[k] !== COORDINATES[k])) throw new Error("the 
 /** Steps of the steered walker at a constant command; an odd number ends with the mirror image. */
 export function activeMap(kernel: Kernel, p: Parameters, steps: number): SectionMap {
   const body: Body = bodyOf(p);
-  const command: Command = { inter_leg_angle: p.inter_leg_angle, offset: p.mass_offset, offset_before: p.mass_offset };
+  const command: Command = { inter_leg_angle: p.inter_leg_angle, mass_offset: p.mass_offset, previous_offset: p.mass_offset };
   const flip = steps % 2 === 1;
   return {
     free: p.slope !== 0 && !p.slope_turns ? [0, 1, 2, 3, 4] : [1, 2, 3, 4],
@@ -204,7 +204,7 @@ export function findCycle(kernel: Kernel, p: Parameters, nearby: State | null = 
 /** Describe the gait at a fixed point, over two steps. */
 export function cycleAt(kernel: Kernel, p: Parameters, state: State): Cycle | null {
   const body = bodyOf(p);
-  const command: Command = { inter_leg_angle: p.inter_leg_angle, offset: p.mass_offset, offset_before: p.mass_offset };
+  const command: Command = { inter_leg_angle: p.inter_leg_angle, mass_offset: p.mass_offset, previous_offset: p.mass_offset };
   const stride = activeMap(kernel, p, 2);
   const derivative = stride.derivative(state);
   const first = kernel.step(body, command, state, 1);

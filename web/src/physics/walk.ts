@@ -222,12 +222,12 @@ export class Walk {
     return this.record(parameters, outcome, fallOf(outcome.status), after, {
       commandedOffset: parameters.mass_offset,
       offsetBefore: this.offset,
-      offset: outcome.offset,
+      offset: outcome.mass_offset,
     });
   }
 
   private command(parameters: Parameters): Command {
-    return { inter_leg_angle: parameters.inter_leg_angle, offset: parameters.mass_offset, offset_before: this.offset };
+    return { inter_leg_angle: parameters.inter_leg_angle, mass_offset: parameters.mass_offset, previous_offset: this.offset };
   }
 
   private trace(parameters: Parameters, command: Command, duration: number): Track {

@@ -54,7 +54,7 @@ const pause = () => new Promise((resolve) => setTimeout(resolve, 0));
 function walked(kernel: Kernel, question: BasinQuestion, state: State): { steps: number; ending: number } {
   const { kind, parameters: p, steps } = question;
   if (kind === "steered") {
-    const command = { inter_leg_angle: p.inter_leg_angle, offset: p.mass_offset, offset_before: p.mass_offset };
+    const command = { inter_leg_angle: p.inter_leg_angle, mass_offset: p.mass_offset, previous_offset: p.mass_offset };
     const walk = kernel.walk(bodyOf(p), command, state, 1, steps);
     return { steps: walk.steps, ending: walk.last.status };
   }
