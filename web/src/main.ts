@@ -4,6 +4,7 @@ import { BicycleExhibit, SkateboardExhibit } from "./exhibits/vehicle_exhibit";
 import { WalkExhibit } from "./exhibits/walk_exhibit";
 import { Kernel } from "./kernel/kernel";
 import { Stage, type View } from "./scene/stage";
+import { makeGif } from "./share/film";
 import { FrameTimes } from "./share/frame_times";
 import { readLink, writeLink, type Settings } from "./share/link";
 import { units } from "./share/units";
@@ -154,7 +155,8 @@ async function main(): Promise<void> {
   requestAnimationFrame(frame);
   document.documentElement.dataset.ready = "true";
   // For tests, and for whoever wants to look closer from the console
-  Object.assign(window, { leanYaw: { kernel, stage, exhibits, active: () => active, frames, units, ready: performance.now() - began } });
+  const look = { kernel, stage, exhibits, active: () => active, frames, units, makeGif, ready: performance.now() - began };
+  Object.assign(window, { leanYaw: look });
 }
 
 main().catch((error: Error) => {

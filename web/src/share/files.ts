@@ -15,8 +15,8 @@ export function download(name: string, content: Blob): void {
 export function asTable(records: StepRecord[]): string {
   const head = [
     "step", "start_time", "duration", "stance", "contact_downhill", "contact_right",
-    ...COORDINATES, "inter_leg_angle", "offset_before", "offset",
-    "gravity_work", "shift_work", "impact_loss", "ankle_loss", "normal_force", "friction_demand", "fall",
+    ...COORDINATES, "inter_leg_angle", "previous_offset", "mass_offset",
+    "gravity_work", "shift_work", "impact_loss", "ankle_loss", "least_normal_force", "greatest_friction", "fall",
   ]; // prettier-ignore
   const lines = records.map((r) =>
     [
