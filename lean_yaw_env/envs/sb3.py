@@ -60,7 +60,7 @@ class WalkerVecEnv(VecEnv):
             threads=threads,
             **options,
         )
-        self.walkers._tells_ends = True
+        self.walkers._tells_episodes = True
         space = self.walkers.single_observation_space
         super().__init__(num_envs, space, self.walkers.single_action_space)
         self._step_info = step_info
