@@ -13,11 +13,13 @@ from agents import load, save
 from agents.controllers.simple import FixedController
 from agents.evaluation.scoring import run_seeds
 from agents.learning.algorithms import settings_for, train
-from agents.learning.gradient.differentiation import bounded
-from agents.learning.gradient.learner import GradientSettings
-from agents.learning.gradient.networks import make_policy
-from agents.learning.gradient.returns import Window, time_discounted_returns
-from agents.learning.gradient.walkers import DifferentiableWalkers
+from agents.learning.apg import GradientSettings, make_policy
+from agents.learning.differentiable import (
+    DifferentiableWalkers,
+    Window,
+    bounded,
+    time_discounted_returns,
+)
 from agents.learning.recorder import CheckpointError
 from agents.seeds import TUNING_SEEDS
 from lean_yaw_env.envs.linearised import LinearisedSteps
@@ -322,6 +324,13 @@ def test_training_is_decided_by_its_seed():
         assert (weights == again.policy.weights[name]).all()
     assert (first.log.returns == again.log.returns).all()
     assert (first.policy.weights["layers.0.weight"] != other.policy.weights["layers.0.weight"]).any()  # fmt: skip
+
+
+def test_a_training_logs_each_of_its_episodes_by_itself():
+    log = trained().log
+    # every step belongs to one episode, and some are not over when the training is
+    assert 0 < log.lengths.sum() <= TINY.steps
+    assert len(log.lengths) > TINY.walkers
 
 
 def test_interrupted_training_goes_on_bit_for_bit(tmp_path: Path):

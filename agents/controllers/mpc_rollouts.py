@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.agent import Agent
-from agents.controllers.mpc_settings import MpcSettings
 from lean_yaw_env.envs.options import ACTION_SIZE
 from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.parameters import Vector
+
+from ..agent import Agent
+from .mpc_settings import MpcSettings
 
 _KEYS = 64  # sets of scenarios, one for each step of an episode in turn
 _LARGEST_PUSH = 10.0  # push level that there is

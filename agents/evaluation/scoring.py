@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.simulation import Simulation

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lean_yaw_env.envs.dynamics import walk_many, walk_one
+from lean_yaw_env.envs.dynamics import command_many, walk_many, walk_one
 from lean_yaw_env.envs.info import FallCode, InfoMaker
 from lean_yaw_env.envs.judging import What
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, settings_of
@@ -157,6 +157,10 @@ class Simulation:
     def observe(self) -> None:
         """Show records that were set by hand: derived fields and observations anew, without a step."""
         self._judge(*self._judged(_PLACE, self._nobody, None, 0, self.n))
+
+    def command(self) -> None:
+        """Put what ``actions`` command into the records (``inter_leg_angle``, ``commanded_offset``), without a step."""
+        command_many(self.walkers, self.settings, self.actions)
 
     def take_over(self, other: Simulation, rows: NDArray[np.int64]) -> None:
         """Put walkers of another simulation of this task, those of ``rows`` (n,), in the place of these; ``observe`` shows them."""

@@ -9,8 +9,9 @@ import torch
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from torch import Tensor
+from torch.autograd import Function
+from torch.autograd.function import once_differentiable
 
-from agents.learning.gradient.differentiation import bounded, with_known_jacobians
 from lean_yaw_env.envs.derivatives import FOLLOWED
 from lean_yaw_env.envs.linearised import LinearisedSteps
 from lean_yaw_env.envs.options import EnvOptions
@@ -160,6 +161,7 @@ class DifferentiableWalkers:
         """Begin new episodes where they ended."""
         if not ended.any():
             return
+        self._returns[ended], self._lengths[ended] = 0.0, 0
         fresh, _ = self.env.reset(options={"reset_mask": ended})
         mask = torch.from_numpy(ended)[:, None]
         values = torch.from_numpy(self._linearised.values())
@@ -167,3 +169,122 @@ class DifferentiableWalkers:
         self.observations = torch.where(
             mask, torch.from_numpy(fresh.astype(float)), self.observations
         )
+
+
+class _Known(Function):
+    """Values computed elsewhere, with the Jacobian that goes with them."""
+
+    @staticmethod
+    def forward(ctx: Any, inputs: Tensor, values: Tensor, jacobians: Tensor) -> Tensor:
+        ctx.save_for_backward(jacobians)
+        return values.clone()
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None, None]:
+        (jacobians,) = ctx.saved_tensors
+        return torch.einsum("nk,nkj->nj", gradient, jacobians), None, None
+
+
+def with_known_jacobians(inputs: Tensor, values: Tensor, jacobians: Tensor) -> Tensor:
+    """``values``, which a compiled computation made of ``inputs``, as a differentiable function of them.
+
+    Parameters
+    ----------
+    inputs : shape (n, j)
+    values : shape (n, k)
+    jacobians : shape (n, k, j)
+        The derivatives of ``values`` by ``inputs``.
+    """
+    return _Known.apply(inputs, values, jacobians)  # pyright: ignore[reportReturnType]
+
+
+class _Bounded(Function):
+    @staticmethod
+    def forward(ctx: Any, value: Tensor, middle: Tensor, reach: float) -> Tensor:
+        low, high = middle - reach, middle + reach
+        ctx.save_for_backward(value < low, value > high)
+        return torch.minimum(torch.maximum(value, low), high)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, Tensor, None]:
+        below, above = ctx.saved_tensors
+        by_value = torch.where(below, gradient.clamp(max=0.0), gradient)
+        by_value = torch.where(above, gradient.clamp(min=0.0), by_value)
+        return by_value, torch.where(below | above, gradient, 0.0), None
+
+
+def bounded(value: Tensor, middle: Tensor, reach: float) -> Tensor:
+    """``value`` kept within ``reach`` of ``middle``, each of shape (n,), with a derivative for descent on a loss.
+
+    The true derivative by a value that is out of bounds is zero, from which descent never comes back. Here it is that at the bound
+    where descent would bring the value back, and zero where it would lead further out, as in a projected gradient.
+    """
+    return _Bounded.apply(value, middle, reach)  # pyright: ignore[reportReturnType]
+
+
+class Window(NamedTuple):
+    """A window of steps of many walkers, with gradients.
+
+    Attributes
+    ----------
+    observations : shape (window, n, features)
+        Before each step.
+    next_observations : shape (window, n, features)
+        After it: where it ended an episode, that episode's last ones.
+    rewards, durations : shape (window, n)
+    terminated, truncated : bool, shape (window, n)
+    """
+
+    observations: Tensor
+    next_observations: Tensor
+    rewards: Tensor
+    durations: Tensor
+    terminated: Tensor
+    truncated: Tensor
+
+    @classmethod
+    def of(cls, observations: list[Tensor], steps: list[Walked]) -> Window:
+        """Steps one after the other, and what was observed before each."""
+        return cls(
+            torch.stack(observations),
+            torch.stack([step.observations for step in steps]),
+            torch.stack([step.rewards for step in steps]),
+            torch.stack([step.durations for step in steps]),
+            torch.stack([step.terminated for step in steps]),
+            torch.stack([step.truncated for step in steps]),
+        )
+
+
+def time_discounted_returns(
+    window: Window, next_values: Tensor, time_constant: float, trace: float
+) -> Tensor:
+    """The lambda-return from each step on, shape (window, n).
+
+    A step's discount is exp(-duration / time constant), and its reward, spread evenly over its duration, is discounted within the step
+    too: a policy gains nothing by the length of its steps as such. After a fall nothing more is earned.
+
+    Parameters
+    ----------
+    window : Window
+    next_values : shape (window, n)
+        The critic's, after each step.
+    time_constant : float
+    trace : lambda, from 0 (one step, then the critic) to 1 (the whole window, then the critic)
+    """
+    ratio = window.durations / time_constant
+    lives = ~window.terminated
+    # the limit for a step that took no time, which a fall may do
+    within = torch.where(lives, -torch.expm1(-ratio) / torch.where(lives, ratio, 1.0), 1.0)
+    rewards = window.rewards * within
+    discounts = torch.where(lives, torch.exp(-ratio), 0.0)
+    ends = window.terminated | window.truncated
+    onward = next_values[-1]
+    returns: list[Tensor] = []
+    for step in range(len(rewards) - 1, -1, -1):
+        value = next_values[step]
+        mixed = torch.where(ends[step], value, value + trace * (onward - value))
+        onward = rewards[step] + discounts[step] * mixed
+        returns.append(onward)
+    return torch.stack(returns[::-1])
