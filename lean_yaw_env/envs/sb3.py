@@ -201,7 +201,4 @@ class WalkerVecEnv(VecEnv):
 
 def _of_walker(info: dict[str, Any], i: int) -> dict[str, Any]:
     """One walker's share of a vector environment's info, as a single environment gives it."""
-    return {
-        key: value[i] for key, value in info.items() if not key.startswith(("_", "final_"))
-    }
-
+    return {key: value[i] for key, value in info.items() if not key.startswith(("_", "final_"))}

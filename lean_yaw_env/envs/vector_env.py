@@ -201,7 +201,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         """Keep what the ended episodes ended with, then begin new ones."""
         mask = self._ended.copy()
         observations = np.full(self.num_envs, None, dtype=object)
-        for i in np.flatnonzero(mask):
+        for i in np.flatnonzero(mask).tolist():
             observations[i] = self._observation(i)
         final = {"final_obs": observations, "_final_obs": mask}
         if self._tells_episodes:
@@ -209,6 +209,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
             final |= {"final_info": told, "_final_info": mask}
         self._begin(mask, infos)
         return final
+
     def _reset_mask(self, mask: Any) -> NDArray[np.bool_]:
         if mask is None:
             return np.ones(self.num_envs, dtype=np.bool_)
