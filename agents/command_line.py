@@ -9,22 +9,21 @@ import os
 import shlex
 import sys
 from collections.abc import Iterable
+from json import dumps
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 from rich.console import Console
 
+from lean_yaw_env.errors import LeanYawError
 from lean_yaw_env.registration import TASK_VERSIONS
-
-from .evaluation.closed_loop import main as closed_loop
 
 ALL = "all"
 CACHE = "evaluations"
 """Folder, below that of the trainings, where finished episodes are kept."""
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, no_args_is_help=True)
-app.command("closed-loop")(closed_loop)
 
 Runs = Annotated[Path, typer.Option(help="Where trainings left their folders.")]
 AgentPath = Annotated[
@@ -162,6 +161,58 @@ def tasks_in(given: Iterable[str]) -> list[str]:
 def command_as_typed() -> str:
     """What was typed, as a page quotes it."""
     return shlex.join(["python", "-m", str(__package__), *sys.argv[1:]])
+
+
+@app.command("closed-loop")
+def closed_loop(
+    task: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="The task's name, several separated by commas, or all; each gets its own section. Heading by default.",
+            show_default=False,
+        ),
+    ] = None,
+    agents: Annotated[
+        str,
+        typer.Option(
+            help="Agents, separated by commas; those that remember or draw are refused. With several tasks, one that is not for a task is "
+            "left out there."
+        ),
+    ] = "fixed,lqr,ppo",
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for closed_loop.md, closed_loop.csv and images/closed_loop_*.png."
+        ),
+    ] = None,
+    agent_path: AgentPath = None,
+    runs: Runs = Path("runs"),
+    points: Annotated[int, typer.Option(help="To a side of a basin's picture.")] = 81,
+    starts: Annotated[int, typer.Option(help="In the box of starts.")] = 4096,
+    directions: Annotated[int, typer.Option(help="Of pushes.")] = 24,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
+) -> None:
+    """Analyse walker and agent as one dynamical system: gait, eigenvalues, basins of attraction, largest pushes survived, contact forces and work."""
+    from .evaluation.closed_loop import examine_all, show, write_report
+    from .evaluation.closed_loop_report import plain
+
+    try:
+        names = names_in([agents])
+        if not names:
+            raise ValueError(f"agents must name one or more, got {agents!r}")
+        reports, notes = examine_all(
+            tasks_in(task or ["Heading"]), names,
+            path=agent_path, runs=runs, points=points, starts=starts, directions=directions,
+        )  # fmt: skip
+    except (ValueError, LeanYawError) as error:
+        raise typer.BadParameter(str(error)) from error
+    if as_json:
+        typer.echo(dumps([plain(report) for report in reports], indent=2, allow_nan=False))
+    else:
+        show(reports, notes)
+    if out is not None and reports:
+        page = write_report(reports, out, command_as_typed(), notes)
+        typer.echo(f"written: {page}", err=True)
 
 
 @app.command()

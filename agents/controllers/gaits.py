@@ -22,22 +22,24 @@ from numpy.typing import ArrayLike
 from scipy.optimize import root
 
 from lean_yaw_env.analysis.fixed_point import RESIDUAL_LIMIT, solve_fixed_point
-from lean_yaw_env.analysis.section_map import ActiveMap
-from lean_yaw_env.analysis.stride import differentiate_step
+from lean_yaw_env.analysis.active_map import ActiveMap, has_downhill
+from lean_yaw_env.analysis.path import distance_walked
+from lean_yaw_env.analysis.stride import StepDerivatives, differentiate_step
+from lean_yaw_env.envs.formulas import advance
 from lean_yaw_env.envs.options import gait_of
 from lean_yaw_env.errors import LeanYawError, NoGaitError
 from lean_yaw_env.kernel.jacobian import OUTPUTS
 from lean_yaw_env.kernel.records import Command
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, MIRROR, STATE_SIZE, Vector, WalkerParameters
 from lean_yaw_env.validation import require_number
-from lean_yaw_env.walker import StepResult, Walker
+from lean_yaw_env.walker import Walker
 
 ANGLES = tuple(np.linspace(0.15, 0.45, 13).tolist())
 DOWNHILL_HEADINGS = tuple(np.linspace(-0.7, 0.7, 9).tolist())
 ALL_HEADINGS = tuple(np.linspace(-math.pi, math.pi, 17).tolist())
 SIZE = STATE_SIZE + 1
 """Of the regulated state: the section state and the mass offset in force."""
-_SPEED_OUTPUTS = ("duration", "displacement_x", "displacement_z")
+_TINY = 1e-30
 
 
 @dataclass(frozen=True)
@@ -108,25 +110,19 @@ def linearise_step(
     by_input[:STATE_SIZE, 1] = MIRROR * step.by_mass_offset
     # the masses arrive at old offset + change within the step, and the mirror turns their side round
     by_state[-1, -1] = by_input[-1, 1] = -1.0
-    walked = walker.step(
-        state, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset, previous_offset=before
-    )
-    gradient = _speed_gradient(walked, state, step.jacobian)
+    gradient = _speed_gradient(state, step)
     by_angle, by_offset, by_before = gradient[STATE_SIZE:]
     speed = np.array([*gradient[:STATE_SIZE], by_offset + by_before, by_angle, by_offset])
     return LinearStep(by_state, by_input, speed)
 
 
-def _speed_gradient(walked: StepResult, state: Vector, jacobian: Vector) -> Vector:
-    """A step's speed along its mean heading, (downhill cos - right sin) / duration, by the inputs of its Jacobian: shape (8,)."""
-    heading = 0.5 * (state[0] + walked.state[0])
-    cosine, sine = math.cos(heading), math.sin(heading)
-    downhill, right = walked.displacement
-    by_heading = 0.5 * (np.eye(1, jacobian.shape[1])[0] + jacobian[0])
-    duration, along, across = (jacobian[OUTPUTS.index(name)] for name in _SPEED_OUTPUTS)
-    advance = cosine * along - sine * across - (downhill * sine + right * cosine) * by_heading
-    speed = (downhill * cosine - right * sine) / walked.duration
-    return (advance - speed * duration) / walked.duration
+def _speed_gradient(state: Vector, step: StepDerivatives) -> Vector:
+    """A step's speed along its mean heading by the inputs of its Jacobian, shape (8,): the imaginary part of numbers that carry derivatives."""
+    carrying = step.outputs[:, None] + 1j * _TINY * step.jacobian
+    named = dict(zip(OUTPUTS, carrying, strict=True))
+    before = state[0] + 1j * _TINY * np.eye(1, step.jacobian.shape[1])[0]
+    along = advance(named["displacement_x"], named["displacement_z"], 0.5 * (before + named["heading"]))
+    return (along / named["duration"]).imag / _TINY
 
 
 @dataclass(frozen=True)
@@ -152,11 +148,6 @@ class GaitNode:
     pumping: float
     speed: float
     step: LinearStep
-
-
-def has_downhill(parameters: WalkerParameters) -> bool:
-    """Whether headings differ: not on the level, nor where the slope turns with the walker."""
-    return parameters.slope != 0.0 and not parameters.slope_turns
 
 
 def headings_of(parameters: WalkerParameters, pumping: Pumping) -> tuple[float, ...]:
@@ -232,7 +223,7 @@ class _GaitGrid:
         else:
             state = solve_fixed_point(two_steps, start)
         first, second = two_steps.results(state)
-        chord = float(np.linalg.norm(first.displacement + second.displacement))
+        distance = float(distance_walked([first.displacement, second.displacement]))
         left, right = two_steps.mass_offset
         apart = state.copy()
         apart[0] = 0.5 * (state[0] - first.state[0])
@@ -241,7 +232,7 @@ class _GaitGrid:
             state=apart,
             held_offset=0.5 * (left + right),
             pumping=aside,
-            speed=chord / (first.duration + second.duration),
+            speed=distance / (first.duration + second.duration),
             step=linearise_step(self._walker, state, angle, left, right),
         )
 

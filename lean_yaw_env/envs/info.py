@@ -123,14 +123,14 @@ def _metric(key: str, metric: Any) -> Info:
 
 
 def infos_of(task: Any) -> tuple[Info, ...]:
-    """The numbers that a task tells beside state, footprint and fall; the last six on some conditions."""
+    """The numbers that a task tells beside state, footprint and fall: those of pushes first, those of bodies last."""
     heading = () if task.heading_field is None else (task.heading_field,)
     common = {info.key for info in COMMON_INFOS}
     return (
+        *PUSH_INFOS,
         *COMMON_INFOS,
         *(_metric(key, metric) for key, metric in task.metrics.items() if key not in common),
         *(HEADING_INFO._replace(source=_read(name)) for name in heading),
-        *PUSH_INFOS,
         *BODY_INFOS,
     )
 
@@ -159,16 +159,11 @@ class InfoMaker:
 
     def __init__(self, task: Any, *, has_pushes: bool, has_bodies: bool) -> None:
         self.size = info_size(task)
-        hidden = set() if has_pushes else {info.key for info in PUSH_INFOS}
-        hidden |= set() if has_bodies else {info.key for info in BODY_INFOS}
         infos = infos_of(task)
-        told = [k for k, info in enumerate(infos) if info.key not in hidden]
-        # what is hidden comes last as a rule, and a slice is quicker than a choice
-        is_first = told == list(range(len(told)))
-        self._columns: Any = [_FIRST_NUMBER + k for k in told]
-        if is_first:
-            self._columns = slice(_FIRST_NUMBER, _FIRST_NUMBER + len(told))
-        self._names = tuple(infos[k].key for k in told)
+        first = 0 if has_pushes else len(PUSH_INFOS)
+        last = len(infos) - (0 if has_bodies else len(BODY_INFOS))
+        self._columns = slice(_FIRST_NUMBER + first, _FIRST_NUMBER + last)
+        self._names = tuple(info.key for info in infos[first:last])
         self._masks = tuple(f"_{key}" for key in (*self._names, "state", "footprint", "fall"))
 
     def views(self, row: Vector) -> tuple[Vector, Vector, Vector]:

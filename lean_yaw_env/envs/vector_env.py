@@ -143,8 +143,11 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
             self._begin(self._ended.copy(), infos)
         rewards, (terminated, truncated) = simulation.rewards, simulation.ends
         np.logical_or(terminated, truncated, out=self._ended)
+        ends = np.count_nonzero(self._ended) > 0
+        if ends:
+            simulation.note_failures()
         final: dict[str, Any] = {}
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and np.count_nonzero(self._ended):
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and ends:
             final = self._restart_in_same_step(infos)
         info = {} if page is None else page.info(simulation.falls)
         return self._observations(), rewards, terminated, truncated, final | info

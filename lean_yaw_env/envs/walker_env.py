@@ -127,6 +127,8 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         if not simulation.step_one(self._infos):
             raise ValueError(f"action must be numbers in [-1, 1], got {chosen.tolist()}")
         (terminated,), (truncated,) = simulation.ends.tolist()
+        if terminated:
+            simulation.note_failures()
         self._running = not (terminated or truncated)
         if self._footage is not None:
             self._footage.extend()
