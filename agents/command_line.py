@@ -65,17 +65,18 @@ def evaluate(
         typer.Option(help="Episodes of each agent, for each of its trainings; the same for all."),
     ] = 1000,
     costly_episodes: Annotated[
-        int, typer.Option(help="Episodes of agents that plan at every step, at most.")
+        int,
+        typer.Option(help="Largest number of episodes for agents that plan at every step (mpc)."),
     ] = 40,
     seed: Annotated[
-        int, typer.Option(help="Another number draws other episodes; none is ever trained on.")
+        int, typer.Option(help="Seed of the evaluation episodes. No training uses these episodes.")
     ] = 0,
     agent_path: AgentPath = None,
     runs: Runs = Path("runs"),
     cache: Annotated[
         Path | None,
         typer.Option(
-            help="Keep finished episodes in this folder and go on with what is there; evaluations below --runs for all tasks.",
+            help="Folder in which finished episodes are kept, so that an interrupted evaluation can continue; evaluations below --runs for several tasks.",
             show_default=False,
         ),
     ] = None,
@@ -134,7 +135,7 @@ def evaluate(
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     except KeyboardInterrupt as interruption:
-        Console(stderr=True).print("interrupted; call the same command to go on")
+        Console(stderr=True).print("interrupted; run the same command again to continue")
         raise typer.Exit(130) from interruption
     show(rows, Console(), as_json=json)
 
@@ -220,18 +221,16 @@ def train(
         str, typer.Option(help="The task's name, as in LeanYaw/<task>-v0.")
     ] = "Heading",
     seed: Annotated[
-        int | None, typer.Option(help="Of all that is drawn; 0 otherwise.", show_default=False)
+        int | None, typer.Option(help="Random seed; 0 by default.", show_default=False)
     ] = None,
     seeds: Annotated[
         str | None,
         typer.Option(
-            help="Several seeds in place of one, each a run: 0-4, or 5 for the same, or 0,3,7.",
+            help="Several seeds instead of one, a run for each: 0-4, or 5 for the same, or 0,3,7.",
             show_default=False,
         ),
     ] = None,
-    jobs: Annotated[
-        int, typer.Option(min=1, help="Processes that several seeds are trained in.")
-    ] = 1,
+    jobs: Annotated[int, typer.Option(min=1, help="Number of processes for several seeds.")] = 1,
     algorithm: Annotated[
         str | None,
         typer.Option(help="ppo, sac or apg; ppo otherwise.", show_default=False),
@@ -246,7 +245,7 @@ def train(
     episodes: Annotated[
         int | None,
         typer.Option(
-            help="Episodes that each agent is judged by; 1000 otherwise.", show_default=False
+            help="Evaluation episodes of each agent; 1000 by default.", show_default=False
         ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Where runs leave their folders.")] = Path("runs"),
@@ -254,8 +253,8 @@ def train(
         bool,
         typer.Option(
             "--resume",
-            help="Go on with what is unfinished of the task's newest run or series of seeds under --out, or of --run; "
-            "its options are kept, and the result is bit for bit that of no interruption.",
+            help="Continue the newest unfinished run (or series of seeds) of the task under --out, or the one named by --run. Its options are kept. "
+            "The result is equal, bit for bit, to that of a training without interruption.",
         ),
     ] = False,
     folder: Annotated[
@@ -275,9 +274,9 @@ def train(
         bool, typer.Option("--tensorboard", help="Write TensorBoard's logs into the run's folder.")
     ] = False,
 ) -> None:
-    """Train an agent on a task, judge it beside random actions, the fixed controller and feedback, and leave all of it under runs/.
+    """Train an agent on a task, compare it with random actions, the fixed controller and feedback, and write the results under runs/.
 
-    With --seeds, also the learning curves of all of them in one picture, and how far their results lie apart.
+    With --seeds, also draw all learning curves in one picture and print the spread of the results.
     """
     from .evaluation.tables import show
     from .learning.series import RunError, is_series
@@ -294,18 +293,20 @@ def train(
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     again = f"python -m {__package__} train --resume --run {place}"
-    console.print(f"training in {place}; after an interruption: {again}", soft_wrap=True)
+    console.print(
+        f"training in {place}; after an interruption, continue with: {again}", soft_wrap=True
+    )
     try:
         if is_series(place):
             _train_series(place, jobs, console)
         else:
             show(run(place).rows, console)
     except KeyboardInterrupt as interruption:
-        console.print(f"interrupted; go on by: {again}", soft_wrap=True)
+        console.print(f"interrupted; continue with: {again}", soft_wrap=True)
         raise typer.Exit(130) from interruption
     except (ValueError, RunError) as error:
         raise typer.BadParameter(str(error)) from error
-    console.print(f"agent, settings, learning curve and judgement are in {place}", soft_wrap=True)
+    console.print(f"agent, settings, learning curve and evaluation are in {place}", soft_wrap=True)
 
 
 def _training_place(
@@ -346,7 +347,7 @@ def tune(
     agent: Annotated[str, typer.Argument(help="feedback, lqr, mpc, ppo or sac.")],
     task: Annotated[str, typer.Argument(help="The task's name.")],
     trials: Annotated[
-        int, typer.Option(help="Trials in all, those already in the file counted.")
+        int, typer.Option(help="Total number of trials, including those in the study already.")
     ] = 100,
     episodes: Annotated[
         int | None,
@@ -383,7 +384,7 @@ def tune(
 ) -> None:  # fmt: skip
     """Search for settings of a controller or a learner, beginning with those that come with the package, and print the best.
 
-    Trials are scored on episodes set aside for tuning. Interrupted or not, a second call goes on where the first ended.
+    Trials are scored on episodes set aside for tuning. The same command continues an interrupted study.
     """
     from .tuning.study import Tuning, best_trial, result_words
     from .tuning.study import tune as run_trials
@@ -398,7 +399,7 @@ def tune(
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     except KeyboardInterrupt as interruption:
-        typer.echo("interrupted; what is done is kept, call the same command to go on")
+        typer.echo("interrupted; run the same command again to continue")
         raise typer.Exit(130) from interruption
     best = best_trial(study)
     if best is None:
@@ -439,7 +440,8 @@ def ship(
 def film(
     task: Annotated[str, typer.Option(help="A task's name, or all.")] = ALL,
     agent: Annotated[
-        str, typer.Option(help="Who is filmed; where it is not trained for a task, lqr is.")
+        str,
+        typer.Option(help="The agent. If it was not trained for a task, lqr is filmed instead."),
     ] = "ppo",
     out: Annotated[Path, typer.Option(help="Folder for <task>.gif.")] = Path("docs/videos"),
     seed: Annotated[int, typer.Option(help="Another number films other episodes.")] = 0,
@@ -455,7 +457,7 @@ def film(
     agent_path: AgentPath = None,
     runs: Runs = Path("runs"),
 ) -> None:
-    """Film an agent at every task, in an episode it was not trained on, with heading, goal, path and pushes drawn."""
+    """Film an agent at a task, in an evaluation episode. Heading, goal, path and pushes are drawn."""
     from .evaluation.videos import agent_for, film_agent
 
     try:

@@ -8,15 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lean_yaw_env.envs.observation import COMMON_CENTRES, COMMON_NAMES, COMMON_SCALES
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
-from lean_yaw_env.envs.transition import OFFSET_SCALE, STATE_CENTRES, STATE_SCALES
-from lean_yaw_env.parameters import STATE_FIELDS
 
-_CENTRES = dict(zip((field.name for field in STATE_FIELDS), STATE_CENTRES, strict=True))
-_SCALES = dict(zip((field.name for field in STATE_FIELDS), STATE_SCALES, strict=True))
-_CENTRES |= {"mass_offset": 0.0, "stance_foot": 0.0}
-_SCALES |= {"mass_offset": OFFSET_SCALE, "stance_foot": 1.0}
+_CENTRES = dict(zip(COMMON_NAMES, COMMON_CENTRES, strict=True))
+_SCALES = dict(zip(COMMON_NAMES, COMMON_SCALES, strict=True))
 
 
 @dataclass(frozen=True)
@@ -44,8 +41,8 @@ class ObservationLayout:
                 raise ValueError(
                     f"task must be one that shows {name}, got {task!r}, which shows {', '.join(names)}"
                 )
-        centres = _CENTRES | {feature.name: feature.centre for feature in made.features}
-        scales = _SCALES | {feature.name: feature.scale for feature in made.features}
+        centres = _CENTRES | {feature.name: feature.centre for feature in made.observed}
+        scales = _SCALES | {feature.name: feature.scale for feature in made.observed}
         return cls(
             names,
             tuple(centres[name] for name in names),

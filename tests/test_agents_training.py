@@ -28,6 +28,7 @@ from agents.policies import storage
 from agents.settings import all_settings
 from agents.shipping import ship
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.registration import TASK_VERSIONS
 
 ID = "LeanYaw/Heading-v0"
 TINY = PPOSettings(
@@ -207,7 +208,7 @@ def test_finished_runs_are_shipped_and_loaded_by_id_and_others_are_refused(tmp_p
     with pytest.raises(ValueError, match=r"no policy can be loaded"):
         ship(folder)
     result = run(folder, progress=False)
-    shipped = ship(folder)
+    (shipped,) = ship(folder)
     assert shipped == tmp_path / "trained" / "Heading-v0" / "ppo" / "seed3"
     names = ["evaluation.json", "policy.json", "policy.safetensors"]
     assert sorted(path.name for path in shipped.iterdir()) == names
@@ -216,7 +217,7 @@ def test_finished_runs_are_shipped_and_loaded_by_id_and_others_are_refused(tmp_p
     assert rows == rows_to_plain([row for row in result.rows if row.agent == "ppo"])
     with pytest.raises(ValueError, match="replace it by --replace"):
         ship(folder)
-    assert ship(folder, replace=True) == shipped
+    assert ship(folder, replace=True) == [shipped]
     (folder / "evaluation.json").unlink()
     with pytest.raises(ValueError, match="is not finished"):
         ship(folder, replace=True)
@@ -315,8 +316,8 @@ def test_every_option_of_the_command_line_is_explained():
 
 def test_every_environment_has_settings_and_bad_ones_are_refused():
     for algorithm, entry in ALGORITHMS.items():
-        assert set(all_settings()[algorithm]) <= set(entry.tasks)
-        for task in entry.tasks:
+        assert set(all_settings()[algorithm]) <= set(TASK_VERSIONS)
+        for task in TASK_VERSIONS:
             assert isinstance(settings_for(algorithm, task), entry.settings)
     with pytest.raises(ValueError, match="task must be one of"):
         settings_for("ppo", "CartPole")

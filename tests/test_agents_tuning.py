@@ -27,7 +27,7 @@ from agents.command_line import app
 from agents.controllers.guidance import PathSettings
 from agents.controllers.lqr import LqrSettings
 from agents.controllers.mpc_settings import MpcSettings
-from agents.controllers.simple import FixedController
+from agents.controllers.simple import FixedController, HeadingGains
 from agents.learning.algorithms import ALGORITHMS, settings_for
 from agents.learning.ppo import PPOSettings
 from agents.observations import ObservationLayout
@@ -151,17 +151,18 @@ def test_settings_of_a_learner_that_no_choice_holds_can_be_drawn(algorithm, monk
 
 
 def test_gains_are_sought_around_the_settings_as_they_are(monkeypatch):
-    tried = []
-    monkeypatch.setattr(study, "_mean_return", lambda agent, *rest: float(len(tried)))
-    original = study._kept
-    monkeypatch.setattr(study, "_kept", lambda tuning, s: tried.append(s) or original(tuning, s))
-    quiet(Tuning("lqr", "Push", episodes=1), 40)
-    now = tuned("lqr", "Push", LqrSettings())
+    tried: list[HeadingGains] = []
+    monkeypatch.setattr(
+        study, "_mean_return", lambda agent, *rest: tried.append(agent._gains) or 0.0
+    )
+    quiet(Tuning("feedback", "Heading", episodes=1), 40)
+    now = tuned("feedback", "Heading", HeadingGains())
     assert tried[0] == now
-    shares = [math.log(s.weights.ankle_rate / now.weights.ankle_rate) for s in tried[1:]]
-    # the range is a factor of 250; CMA-ES begins with a standard deviation of 0.15 of its logarithm
-    assert 0.5 < np.std(shares) / (0.15 * math.log(250.0)) < 1.5
-    assert {s.turning_angle for s in tried} == {None}  # not tuned at this task
+    for name, width in (("ankle", 2.0), ("feedforward", 2.0), ("proportional", 0.3)):
+        steps = np.array([getattr(gains, name) - getattr(now, name) for gains in tried[1:]])
+        # CMA-ES begins with a standard deviation of 0.15 of the range; 39 draws, some at its end
+        assert 0.5 < np.std(steps) / (0.15 * width) < 1.5
+        assert np.abs(steps).max() <= 0.45 * width
 
 
 def test_a_number_that_has_no_value_yet_begins_in_the_middle_of_its_range(kept):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,8 +14,7 @@ from ..observations import ObservationLayout
 from ..policies.policy import Policy, PolicyCard, package_versions
 from ..policies.storage import task_of
 from ..settings import tuned
-from .gradient.learner import GradientLearner, GradientSettings
-from .gradient.tasks import FORMULAS
+from .apg import GradientLearner, GradientSettings
 from .learner import LearnerSettings, MakeLearner, settings_to_plain, torch_threads
 from .ppo import PPOLearner, PPOSettings
 from .recorder import Recorder, Report, TrainingLog
@@ -39,18 +37,16 @@ class Algorithm:
     ----------
     settings : class of its settings
     make : its learner's class
-    tasks : names of those that it can learn
     """
 
     settings: type[LearnerSettings]
     make: MakeLearner
-    tasks: Collection[str] = tuple(TASK_VERSIONS)
 
 
 ALGORITHMS: dict[str, Algorithm] = {
     "ppo": Algorithm(PPOSettings, PPOLearner),
     "sac": Algorithm(SACSettings, SACLearner),
-    "apg": Algorithm(GradientSettings, GradientLearner, FORMULAS),
+    "apg": Algorithm(GradientSettings, GradientLearner),
 }
 """By the names that their policies carry."""
 
@@ -61,12 +57,10 @@ def settings_for(algorithm: str, task: str) -> Any:
     Raises
     ------
     ValueError
-        For an algorithm or a task there is not, or a task that the algorithm cannot learn.
+        For an algorithm or a task there is not.
     """
     entry = ALGORITHMS[require_choice("algorithm", algorithm, ALGORITHMS)]
     require_choice("task", task, TASK_VERSIONS)
-    if task not in entry.tasks:
-        raise ValueError(f"{algorithm} learns {', '.join(entry.tasks)}, not {task!r}")
     return tuned(algorithm, task, entry.settings())
 
 

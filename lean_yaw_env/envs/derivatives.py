@@ -5,6 +5,8 @@ without a difference of nearby numbers. The walking step's own come from ``kerne
 
 Inputs are what a step's result depends on: the walker's ``FOLLOWED`` fields before the step, the task's fields of which ``is_followed`` is
 set, then what is commanded (``COMMANDED``). Outputs are the followed fields after the step, the observation, the reward, the duration.
+
+``differentiate`` is a template, as ``judging.judge`` is.
 """
 
 from __future__ import annotations
@@ -154,7 +156,7 @@ def read_observation(column, walker, task, settings):
 
 def differentiate(
     befores, tasks_before, walkers, tasks, settings, steps, jacobians, first, last
-):  # fmt: skip
+):
     """Write the derivatives of the last step of walkers ``first`` to ``last`` - 1; of one that fell, zeros.
 
     Parameters
