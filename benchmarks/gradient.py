@@ -21,15 +21,15 @@ from matplotlib.ticker import EngFormatter
 from tqdm import tqdm
 
 from agents.evaluation.scoring import run_episodes
-from agents.files import read_json, write_json
-from agents.learning.algorithms import algorithm_named
-from agents.learning.checkpoint import Arrays, read_checkpoint
+from agents.learning.algorithms import settings_for, train
+from agents.learning.recorder import Arrays, read_checkpoint
 from agents.observations import ObservationLayout
 from agents.policies.policy import Policy, PolicyCard
 from agents.policies.storage import save, task_of
 from agents.registry import env_id_of
 from benchmarks.machine import machine
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.files import read_json, write_json
 from lean_yaw_env.rendering.figures import new_figure, save_figure
 from lean_yaw_env.rendering.palette import AGENT_COLOURS, unit_colour
 
@@ -119,16 +119,15 @@ def learn(
     env_id: str, algorithm: str, seed: int, steps: int | None, progress: bool = True
 ) -> tuple[Curve, Policy]:
     """Train once, looking at the policy now and then."""
-    found = algorithm_named(algorithm)
-    settings = found.settings_for(env_id)
+    settings = settings_for(algorithm, task_of(env_id))
     if steps is not None:
         settings = replace(settings, steps=steps)
     curve = Curve(algorithm, seed, json.loads(json.dumps(asdict(settings))))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "checkpoint.safetensors"
         watch = Watch(env_id, algorithm, curve, file, settings.steps // LOOKS)
-        trained = found.train(
-            env_id, settings, seed=seed, checkpoint=file, checkpoint_seconds=0.0, report=watch,
+        trained = train(
+            algorithm, env_id, settings, seed=seed, checkpoint=file, checkpoint_seconds=0.0, report=watch,
             progress=progress,
         )  # fmt: skip
     watch.finish(int(trained.policy.card.training["steps"]), trained.policy)

@@ -15,7 +15,8 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecEnv
 
-from agents.learning.ppo_settings import PPOSettings, settings_for
+from agents.learning.algorithms import settings_for
+from agents.learning.ppo import PPOSettings
 from benchmarks.environments import HEADING, kernel_alone
 from benchmarks.measure import SMALLEST, Effort, measure
 from benchmarks.measurements import Measurement, command_line
@@ -102,7 +103,7 @@ def _parts(model: PPO, env: WalkerVecEnv, effort: Effort) -> dict[str, float]:
 
 def run(smallest: bool) -> list[Measurement]:
     """All measurements of training, in microseconds of processor time for each walking step collected."""
-    settings = settings_for(HEADING)
+    settings = settings_for("ppo", "Heading")
     walkers, steps, rollouts = (4, 8, 1) if smallest else (
         settings.walkers, settings.steps_per_update, ROLLOUTS,
     )  # fmt: skip

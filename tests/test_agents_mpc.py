@@ -5,18 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import optuna
 import pytest
 
 from agents import AgentRequest, make_agent
 from agents.controllers.mpc import MpcController
 from agents.controllers.mpc_rollouts import Rollouts
-from agents.controllers.mpc_settings import SETTINGS, MpcSettings, Spread
+from agents.controllers.mpc_settings import MpcSettings, PlanSpread
 from agents.controllers.simple import FixedController
-from agents.controllers.tune_mpc import STEPS_PER_DECISION, suggested, tune
-from agents.evaluation.recording import record_episode
+from agents.evaluation.footprints import record_episode
 from agents.evaluation.scoring import run_seeds
 from agents.seeds import TUNING_SEEDS
+from agents.settings import tuned
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.envs.walker_env import WalkerEnv
@@ -39,7 +38,7 @@ def started(task, n=WALKERS, seed=TUNING_SEEDS, steps=5, **options):
 def decide(env, task, settings=TINY, seed=0, **options):
     agent = MpcController(task, EnvOptions(**options), settings, seed, FixedController())
     agent.attach(env)
-    return agent.predict(env.rows.observations)[0]
+    return agent.predict(env.simulation.observations)[0]
 
 
 @pytest.mark.parametrize("body", [None, "training"])
@@ -48,14 +47,14 @@ def test_a_plan_is_worth_the_reward_that_the_environment_gives_for_it(body):
     env = started("Slalom", **options)
     settings = replace(TINY, window=30.0)
     plans = np.random.default_rng(1).uniform(-0.4, 0.4, (WALKERS, 1, 8, 2))
-    rollouts = Rollouts(env.rows, settings, FixedController(), 0)
+    rollouts = Rollouts(env.simulation, settings, FixedController(), 0)
     worth = rollouts.worth(plans, np.arange(WALKERS))[:, 0]
-    rewards, times = [], [env.rows.memory[:, 8].copy()]
+    rewards, times = [], [env.simulation.walkers["time"].copy()]
     for step in range(8):
         actions = plans[:, 0, step].astype(np.float32)
-        actions[:, 1] *= env.rows.memory[:, 5]
+        actions[:, 1] *= env.simulation.walkers["side"]
         rewards.append(env.step(actions)[1])
-        times.append(env.rows.memory[:, 8].copy())
+        times.append(env.simulation.walkers["time"].copy())
     rate = (rewards[-1] + rewards[-2]) / (times[-1] - times[-3])
     expected = sum(rewards) + rate * (30.0 - (times[-1] - times[0]))
     # the same steps from the same numbers; only the sums are in another order
@@ -64,11 +63,11 @@ def test_a_plan_is_worth_the_reward_that_the_environment_gives_for_it(body):
 
 def test_nothing_of_the_environment_changes_by_planning():
     env = started("Waypoint")
-    arrays = ("memory", "stream", "observations", "actions", "outcomes", "rewards")
-    before = {name: getattr(env.rows, name).copy() for name in arrays}
+    arrays = ("walkers", "tasks", "observations", "actions", "rewards", "ends")
+    before = {name: getattr(env.simulation, name).copy() for name in arrays}
     decide(env, "Waypoint")
     for name in arrays:
-        np.testing.assert_array_equal(getattr(env.rows, name), before[name])
+        np.testing.assert_array_equal(getattr(env.simulation, name), before[name])
 
 
 @pytest.mark.parametrize("task", ["Heading", "Waypoint", "Slalom", "Push"])
@@ -76,7 +75,7 @@ def test_decisions_do_not_depend_on_what_the_episode_will_draw(task):
     env = started(task)
     settings = replace(TINY, scenarios=2) if task == "Push" else TINY
     before = decide(env, task, settings)
-    env.rows.stream[:] = np.random.default_rng(2).integers(2**60, size=env.rows.stream.shape)
+    env.simulation.walkers["key"] = np.random.default_rng(2).integers(2**60, size=WALKERS)
     np.testing.assert_array_equal(decide(env, task, settings), before)
 
 
@@ -87,10 +86,10 @@ def test_a_walker_decides_alone_as_among_others_and_the_same_for_a_seed():
     assert np.any(decide(env, "Slalom", seed=4) != together)
     alone = WalkerEnv("Slalom")
     alone.reset(seed=0)
-    alone.rows.memory[0] = env.rows.memory[1]
+    alone.simulation.take_over(env.simulation, np.array([1]))
     agent = MpcController("Slalom", settings=TINY, seed=3, base=FixedController())
     agent.attach(alone)
-    action, _ = agent.predict(alone.rows.observations[0])
+    action, _ = agent.predict(alone.simulation.observations[0])
     assert action.shape == (2,)
     np.testing.assert_array_equal(action, together[1])
 
@@ -98,7 +97,7 @@ def test_a_walker_decides_alone_as_among_others_and_the_same_for_a_seed():
 def test_decisions_are_the_same_in_space_whether_observations_are_mirrored_or_not():
     mirrored, raw = started("Heading", steps=0), started("Heading", steps=0, mirror=False)
     actions = decide(mirrored, "Heading")
-    actions[:, 1] *= mirrored.rows.memory[:, 5].astype(np.float32)
+    actions[:, 1] *= mirrored.simulation.walkers["side"].astype(np.float32)
     # single precision: an action is rounded before or after its sign is turned, which is exact
     np.testing.assert_array_equal(decide(raw, "Heading", mirror=False), actions)
 
@@ -114,7 +113,7 @@ def test_the_base_acts_where_no_plan_is_better_by_the_margin():
     env = started("Slalom")
     # no plan is better by more than a walker earns
     actions = decide(env, "Slalom", replace(TINY, margin=1e6))
-    np.testing.assert_array_equal(actions, FixedController().predict(env.rows.observations)[0])
+    np.testing.assert_array_equal(actions, FixedController().predict(env.simulation.observations)[0])
     assert np.all(decide(env, "Slalom", replace(TINY, margin=0.0)) != actions)
 
 
@@ -133,7 +132,9 @@ def test_planning_alone_steers():
 
 def test_fewer_scenarios_than_kept_already_stay_up_longer_under_pushes_than_the_fixed_controller():
     options = EnvOptions(horizon=60.0)
-    planner = MpcController("Push", options, replace(SETTINGS["Push"], scenarios=4))
+    planner = MpcController(
+        "Push", options, replace(tuned("mpc", "Push", MpcSettings()), scenarios=4)
+    )
     seeds = range(TUNING_SEEDS, TUNING_SEEDS + 8)
     planned = run_seeds(planner, "Push", seeds, options=options)
     fixed = run_seeds(FixedController(), "Push", seeds, options=options)
@@ -143,7 +144,6 @@ def test_fewer_scenarios_than_kept_already_stay_up_longer_under_pushes_than_the_
 
 @pytest.mark.parametrize("task", list(TASK_VERSIONS))
 def test_every_task_has_settings_and_a_planner_that_walks(task):
-    assert task in SETTINGS
     options = EnvOptions(horizon=3.0)
     # the regulators would take most of the time: their gaits are found at first use
     planner = MpcController(task, options, base=FixedController())
@@ -160,7 +160,7 @@ def test_the_planner_of_that_name_plans_around_the_regulator():
     named = MpcController("Push", options, base=regulator)
     for each in (planner, named):
         each.attach(env)
-    actions = [each.predict(env.rows.observations)[0] for each in (planner, named)]
+    actions = [each.predict(env.simulation.observations)[0] for each in (planner, named)]
     np.testing.assert_array_equal(actions[0], actions[1])
 
 
@@ -168,43 +168,6 @@ def test_planners_work_for_recording_and_delayed_actions_and_bodies_unknown():
     options = EnvOptions(action_delay=True, random_body="held-out", horizon=10.0)
     planner = MpcController("Heading", options, TINY)
     assert record_episode(planner, "Heading", seed=TUNING_SEEDS, options=options).fall is None
-
-
-def test_a_search_returns_the_best_of_what_it_tried_and_of_what_is_kept(monkeypatch):
-    tried = []
-
-    def returns(task, settings, episodes, horizon):
-        tried.append(settings)
-        return 1.0 if len(tried) == 1 else 2.0 - abs(settings.trust - 5.0)
-
-    monkeypatch.setattr("agents.controllers.tune_mpc._mean_return", returns)
-    settings, most = tune("Push", trials=6, episodes=1)
-    # those with too few plans to choose from are not walked
-    assert 3 <= len(tried) <= 7 and tried[0] == SETTINGS["Push"]
-    found = [1.0, *(2.0 - abs(each.trust - 5.0) for each in tried[1:])]
-    assert (settings, most) == (tried[int(np.argmax(found))], max(found))
-
-
-def test_a_search_walks_the_episodes_that_it_judges_by(monkeypatch):
-    # few plans, as what is tried there is of no interest here
-    monkeypatch.setattr("agents.controllers.tune_mpc.STEPS_PER_DECISION", 400)
-    settings, most = tune("Walk", trials=2, episodes=1, horizon=2.0)
-    assert settings.samples <= 100
-    # one reward unit and less for a unit of time
-    assert 0.0 < most <= 4.0
-
-
-@pytest.mark.parametrize("task", ["Push", "Level", "Heading"])
-def test_settings_tried_walk_no_more_steps_for_a_decision_than_allowed(task):
-    study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
-    for _ in range(20):
-        try:
-            tried = suggested(study.ask(), task)
-        except ValueError:
-            continue  # too few plans to choose from: such a trial fails
-        draws = max(tried.scenarios, 1)
-        steps = tried.samples * tried.iterations * (tried.horizon + tried.tail) * draws
-        assert steps <= STEPS_PER_DECISION
 
 
 @pytest.mark.parametrize(
@@ -237,20 +200,20 @@ def test_bad_settings_are_refused_by_name(bad):
 @pytest.mark.parametrize("bad", [{"angle": -0.1}, {"steady": 3.0}, {"angle": 0.0, "steady": 0.0}])
 def test_bad_spreads_are_refused(bad):
     with pytest.raises(ValueError, match="spread"):
-        Spread(**bad)
+        PlanSpread(**bad)
 
 
 def test_planning_needs_the_environment_that_it_is_for():
     planner = MpcController("Heading", settings=TINY, base=FixedController())
     env = started("Heading", steps=0)
     with pytest.raises(RuntimeError, match="attach"):
-        planner.predict(env.rows.observations)
+        planner.predict(env.simulation.observations)
     with pytest.raises(ValueError, match="task"):
         planner.attach(started("Walk", steps=0))
     with pytest.raises(ValueError, match="options"):
         planner.attach(started("Heading", steps=0, action_delay=True))
     planner.attach(env)
     with pytest.raises(ValueError, match="3 walkers"):
-        planner.predict(env.rows.observations[:2])
+        planner.predict(env.simulation.observations[:2])
     with pytest.raises(ValueError, match="seed"):
         MpcController("Heading", seed=-1)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import pickle
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +14,8 @@ import safetensors.numpy
 import torch
 
 import agents
-from agents.learning.ppo import train_ppo
-from agents.learning.ppo_settings import PPOSettings
+from agents.learning.algorithms import train
+from agents.learning.ppo import PPOSettings
 from agents.observations import ObservationLayout
 from agents.policies import storage
 from agents.policies.policy import Policy, PolicyCard
@@ -241,7 +243,9 @@ def test_a_folder_s_policy_of_another_algorithm_is_refused(folder):
 
 def test_the_policy_taken_from_a_training_acts_as_the_trained_network(tmp_path):
     settings = PPOSettings(steps=64, walkers=4, steps_per_update=16, batch_size=64, epochs=1, hidden=(8, 6))  # fmt: skip
-    trained = train_ppo(ID, settings, seed=1, checkpoint=tmp_path / "c.safetensors", progress=False)
+    trained = train(
+        "ppo", ID, settings, seed=1, checkpoint=tmp_path / "c.safetensors", progress=False
+    )
     arrays = safetensors.numpy.load((tmp_path / "c.safetensors").read_bytes())
     names = ("mlp_extractor.policy_net.0", "mlp_extractor.policy_net.2", "action_net")
     observation = np.random.default_rng(0).normal(size=(20, FEATURES)).astype(np.float32)
@@ -254,3 +258,38 @@ def test_the_policy_taken_from_a_training_acts_as_the_trained_network(tmp_path):
         signal = np.tanh(signal) if k < 2 else np.clip(signal, -1.0, 1.0)
     # float32 against float64
     assert trained.policy.predict(observation)[0] == pytest.approx(signal, abs=1e-5)
+
+
+def core_alone(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run a program as where only the core's dependencies are installed."""
+    others = "cmaes matplotlib moviepy optuna PIL pygame rich safetensors stable_baselines3 sympy torch tqdm typer xarray"
+    block = f"import sys; sys.modules |= dict.fromkeys({others.split()!r})\n"
+    command = [sys.executable, "-c", block + program, *arguments]
+    return subprocess.run(command, cwd=Path(__file__).parents[1], capture_output=True, text=True)
+
+
+def test_the_core_alone_runs_controllers_and_says_what_policies_need():
+    program = """
+from agents import AgentRequest, FixedController, load, make_agent
+from agents.evaluation.scoring import run_episodes
+from lean_yaw_env.envs.options import EnvOptions
+short = EnvOptions(horizon=3.0)
+for agent in (FixedController(), make_agent("lqr", AgentRequest("LeanYaw/Walk-v0", short))):
+    print(run_episodes(agent, "Walk", episodes=1, options=short).survived)
+try:
+    load("LeanYaw/Walk-v0")
+except ImportError as error:
+    print(error)
+"""
+    done = core_alone(program)
+    assert done.returncode == 0, done.stderr
+    hint = "safetensors is not installed, run `pip install 'lean-yaw-env[agents]'`"
+    assert done.stdout.splitlines() == ["[ True]", "[ True]", hint]
+
+
+def test_the_command_line_says_what_it_needs():
+    program = "import runpy; runpy.run_module('agents', run_name='__main__')"
+    done = core_alone(program, "--help")
+    assert done.returncode == 1
+    hint = "agents: typer is not installed, run `pip install 'lean-yaw-env[train]'`"
+    assert done.stderr.strip() == hint

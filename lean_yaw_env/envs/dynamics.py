@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lean_yaw_env.envs.formulas import mean_heading, positive
+from lean_yaw_env.envs.formulas import advance, mean_heading, positive
 from lean_yaw_env.kernel.batch import step_batch
 from lean_yaw_env.kernel.compilation import borrowed, entry_point, formula
 from lean_yaw_env.kernel.random import normal
@@ -70,7 +70,7 @@ def move(walker: Any, outcome: Any) -> None:
     walker.ankle_angle = outcome.ankle_angle
     walker.stance_pitch_rate = outcome.stance_pitch_rate
     walker.ankle_rate = outcome.ankle_rate
-    walker.mass_offset = outcome.offset
+    walker.mass_offset = outcome.mass_offset
     walker.duration = outcome.duration
     walker.least_normal_force = outcome.least_normal_force
     walker.greatest_friction = outcome.greatest_friction
@@ -82,10 +82,9 @@ def move(walker: Any, outcome: Any) -> None:
     walker.work += positive(outcome.shift_work)
     x = outcome.displacement_x
     z = outcome.displacement_z
-    heading = mean_heading(walker)
     walker.place_x += x
     walker.place_z += z
-    walker.advance = x * np.cos(heading) - z * np.sin(heading)
+    walker.advance = advance(x, z, mean_heading(walker))
     walker.distance += walker.advance
     # a heel strike at the very start of a step takes no time and tells nothing of speed
     if walks and outcome.duration.real > 0.0:
@@ -100,6 +99,13 @@ def push(walker: Any, settings: Any) -> None:
         walker.ankle_push = settings.ankle_push * normal(walker)
         walker.stance_pitch_rate += walker.pitch_push
         walker.ankle_rate += walker.ankle_push
+
+
+@entry_point()
+def command_many(walkers, settings, actions):
+    """Put the commands that actions mean into all records, without a step."""
+    for i in range(len(walkers)):
+        command(walkers[i], settings[0], actions[i])
 
 
 @entry_point()

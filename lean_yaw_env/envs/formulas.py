@@ -60,6 +60,12 @@ def mean_heading(walker: Any) -> Any:
 
 
 @formula
+def advance(x: Any, z: Any, heading: Any) -> Any:
+    """How far a displacement, downhill and to the right, leads along a heading."""
+    return x * np.cos(heading) - z * np.sin(heading)
+
+
+@formula
 def place(walker: Any) -> Any:
     """Where the walker is, downhill and to the right: the middle of the hips above the floor, beside the stance foot's contact reference point."""
     aside = 0.5 * walker.side * walker.hip_width

@@ -21,6 +21,9 @@ from lean_yaw_env.parameters import Vector
 GOAL_SCALE = 8.0
 """Leg lengths that a goal's unit stands for; a power of two, so that scaling rounds nothing."""
 
+GOAL_LIMIT = 1e6
+"""Bound of a goal's numbers, beyond any walk: what is observed is never cut to it."""
+
 GoalObservation = dict[str, NDArray[Any]]
 
 
@@ -33,7 +36,7 @@ class WaypointGoalEnv(WalkerEnv):
     | key | shape | numbers |
     |---|---|---|
     | observation | (9,) float32 | the section state, the mass offset and the stance foot as in ``WalkerEnv`` with ``mirror=False``, then cosine and sine of the mean heading of the last two footprints |
-    | achieved_goal | (2,) float64 | where the walker is: (downhill at the start, right) / 8 leg lengths, unlimited |
+    | achieved_goal | (2,) float64 | where the walker is: (downhill at the start, right) / 8 leg lengths |
     | desired_goal | (2,) float64 | where it should be, alike |
 
     ## Rewards and ends
@@ -146,10 +149,8 @@ def _scaled(downhill: Vector, right: Vector) -> Vector:
 
 
 def _goal_space(observation: Any) -> Any:
-    goal = spaces.Box(-np.inf, np.inf, (2,), np.float64)
-    return spaces.Dict(
-        {"observation": observation, "achieved_goal": goal, "desired_goal": goal}
-    )
+    goal = spaces.Box(-GOAL_LIMIT, GOAL_LIMIT, (2,), np.float64)
+    return spaces.Dict({"observation": observation, "achieved_goal": goal, "desired_goal": goal})
 
 
 def _unmirrored(options: Mapping[str, Any]) -> dict[str, Any]:

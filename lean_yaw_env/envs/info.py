@@ -1,21 +1,25 @@
 """What ``info`` tells: one table of names, meanings and where each number is read, for one walker and for many.
 
-A step's numbers are written to a fresh record for each walker, by code that is compiled from the table into each task's ``judge``.
+A step's numbers are written to a row for each walker, by code that is compiled from the table into each task's ``judge``.
 """
 
 from __future__ import annotations
 
+import sys
+from collections import deque
 from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lean_yaw_env.envs.state import BODY_NAMES, WALKER_FIELDS, Records
+from lean_yaw_env.envs.state import BODY_NAMES, WALKER_FIELDS
 from lean_yaw_env.kernel import records
 from lean_yaw_env.kernel.compilation import written_formula
-from lean_yaw_env.parameters import STATE_FIELDS, STATE_SIZE
+from lean_yaw_env.parameters import STATE_FIELDS, STATE_SIZE, Vector
 from lean_yaw_env.walker import FALL_OF_STATUS
+
+Flags = NDArray[np.bool_]
 
 
 class FallCode(IntEnum):
@@ -33,10 +37,12 @@ class FallCode(IntEnum):
     """No fall: the integrator gave the step up, and the episode ends where the step began."""
 
     @property
-    def description(self) -> str:
-        """The fall's name as ``lean_yaw_env.Fall`` has it, "solver", or "none"."""
+    def word(self) -> str | None:
+        """The fall's name as ``lean_yaw_env.Fall`` has it, "solver", or None for no fall."""
+        if self is FallCode.SOLVER:
+            return "solver"
         fall = FALL_OF_STATUS.get(float(self) + records.STEPPED)
-        return self.name.lower() if fall is None else fall.value
+        return None if fall is None else fall.value
 
 
 class Info(NamedTuple):
@@ -48,16 +54,11 @@ class Info(NamedTuple):
 
 
 STATE_MEANING = "section state (5,), not mirrored, after the push if there is one"
-FOOTPRINT_MEANING = (
-    "contact reference point of the stance foot (2,): downhill, right, from the start, in leg lengths"
-)
-_ARRAYS = (
-    *((f"state[{k}]", f"walker.{field.name}") for k, field in enumerate(STATE_FIELDS)),
-    ("footprint[0]", "walker.place_x"),
-    ("footprint[1]", "walker.place_z"),
-)
+FOOTPRINT_MEANING = "contact reference point of the stance foot (2,): downhill, right, from the start, in leg lengths"
+_ARRAYS = (*(f"walker.{field.name}" for field in STATE_FIELDS), "walker.place_x", "walker.place_z")
 _FOOTPRINT = slice(STATE_SIZE, STATE_SIZE + 2)
 _FIRST_NUMBER = STATE_SIZE + 2
+_MOST_PAGES = 3  # looked through: who keeps the infos of many steps gets new pages anyway
 
 COMMON_INFOS = (
     Info("stance_side", "walker.side", "+1 while the left foot stands, -1 the right"),
@@ -92,7 +93,7 @@ FALL_INFO = Info(
     "fall",
     "walker.fall",
     "how the last step ended, as an integer: "
-    + ", ".join(f"{code.value} {code.description}" for code in FallCode),
+    + ", ".join(f"{code.value} {code.word or 'none'}" for code in FallCode),
 )
 PUSH_INFOS = tuple(
     Info(f"{name}_push", f"walker.{name}_push", f"the last push on the {name} rate; with pushes")
@@ -119,34 +120,32 @@ def _metric(key: str, metric: Any) -> Info:
 
 
 def infos_of(task: Any) -> tuple[Info, ...]:
-    """The numbers that a task's record of infos holds after state and footprint, but for the fall; the last six are told on some conditions."""
+    """The numbers that a task tells beside state, footprint and fall: those of pushes first, those of bodies last."""
     heading = () if task.heading_field is None else (task.heading_field,)
     common = {info.key for info in COMMON_INFOS}
     return (
+        *PUSH_INFOS,
         *COMMON_INFOS,
         *(_metric(key, metric) for key, metric in task.metrics.items() if key not in common),
         *(HEADING_INFO._replace(source=_read(name)) for name in heading),
-        *PUSH_INFOS,
         *BODY_INFOS,
     )
 
 
-def info_type(task: Any) -> np.dtype[np.void]:
-    """The type of a task's record of infos."""
-    entries: list[Any] = [("state", "f8", (STATE_SIZE,)), ("footprint", "f8", (2,))]
-    entries += [(info.key, "f8") for info in infos_of(task)]
-    return np.dtype([*entries, ("fall", "i8")])
+def info_size(task: Any) -> int:
+    """How many numbers a walker's row of infos holds."""
+    return _FIRST_NUMBER + len(infos_of(task))
 
 
 def info_report(task: Any) -> Any:
-    """The formula ``report(info, walker, task)`` that fills such a record."""
-    pairs = [*_ARRAYS, *((info.key, info.source) for info in infos_of(task)), FALL_INFO[:2]]
-    lines = [f"info.{key} = {source}" for key, source in pairs]
-    return written_formula("report", ("info", "walker", "task"), lines)
+    """The formula ``report(row, walker, task)`` that fills such a row: state, footprint, ``infos_of``."""
+    sources = [*_ARRAYS, *(info.source for info in infos_of(task))]
+    lines = [f"row[{k}] = {source}" for k, source in enumerate(sources)]
+    return written_formula("report", ("row", "walker", "task"), lines)
 
 
 class InfoMaker:
-    """Makes ``info`` dictionaries of a task's records.
+    """Makes ``info`` dictionaries of a task's rows of infos.
 
     Parameters
     ----------
@@ -156,41 +155,88 @@ class InfoMaker:
     """
 
     def __init__(self, task: Any, *, has_pushes: bool, has_bodies: bool) -> None:
-        self.type = info_type(task)
-        hidden: set[str] = set()
-        hidden |= set() if has_pushes else {info.key for info in PUSH_INFOS}
-        hidden |= set() if has_bodies else {info.key for info in BODY_INFOS}
-        told = [
-            (k, info.key) for k, info in enumerate(infos_of(task)) if info.key not in hidden
-        ]
-        self._columns = [_FIRST_NUMBER + k for k, _ in told]
-        self._is_prefix = self._columns == [_FIRST_NUMBER + k for k in range(len(told))]
-        self._last = _FIRST_NUMBER + len(told)
-        self._names = tuple(name for _, name in told)
-        keys = ("state", "footprint", *self._names, "fall")
-        self._masks = tuple(f"_{key}" for key in keys)
-        self._template: dict[str, Any] = dict.fromkeys(keys)
+        self.size = info_size(task)
+        infos = infos_of(task)
+        first = 0 if has_pushes else len(PUSH_INFOS)
+        last = len(infos) - (0 if has_bodies else len(BODY_INFOS))
+        self._columns = slice(_FIRST_NUMBER + first, _FIRST_NUMBER + last)
+        self._names = tuple(info.key for info in infos[first:last])
+        self._masks = tuple(f"_{key}" for key in (*self._names, "state", "footprint", "fall"))
 
-    def one(self, infos: Records) -> dict[str, Any]:
+    def views(self, row: Vector) -> tuple[Vector, Vector, Vector]:
+        """Of a walker's row: the numbers that are told one by one, the state, the footprint."""
+        return row[self._columns], row[:STATE_SIZE], row[_FOOTPRINT]
+
+    def one(self, views: tuple[Vector, Vector, Vector], fall: np.int64) -> dict[str, Any]:
         """The info of a single environment: NumPy's numbers and two arrays."""
-        row = infos.view(np.float64)
-        info = self._template.copy()  # a copy that is filled is quicker than a dict that grows
-        numbers = row[_FIRST_NUMBER : self._last] if self._is_prefix else row[self._columns]
-        info.update(zip(self._names, numbers, strict=True))
-        info["state"] = row[:STATE_SIZE].copy()
-        info["footprint"] = row[_FOOTPRINT].copy()
-        info["fall"] = infos["fall"][0]
+        numbers, state, footprint = views
+        info: dict[str, Any] = dict(zip(self._names, numbers, strict=False))
+        info["state"] = state.copy()
+        info["footprint"] = footprint.copy()
+        info["fall"] = fall
         return info
 
-    def many(self, infos: Records, mask: NDArray[np.bool_]) -> dict[str, Any]:
-        """The infos of a vector environment, views of its records, each key beside its mask."""
-        table = infos.view(np.float64).reshape(len(infos), -1)
-        rows = table.T[_FIRST_NUMBER : self._last] if self._is_prefix else table.T
-        numbers = list(rows) if self._is_prefix else [rows[k] for k in self._columns]
-        info = self._template.copy()
-        info.update(zip(self._names, numbers, strict=True))
+    def many(self, table: Vector, falls: NDArray[np.int64], mask: Flags) -> dict[str, Any]:
+        """The infos of a vector environment, views of its table (n, size), each key beside its mask."""
+        info: dict[str, Any] = dict.fromkeys(self._masks, mask)
+        info.update(zip(self._names, table.T[self._columns], strict=False))
         info["state"] = table[:, :STATE_SIZE]
         info["footprint"] = table[:, _FOOTPRINT]
-        info["fall"] = infos["fall"]
-        info.update(dict.fromkeys(self._masks, mask))
+        info["fall"] = falls
         return info
+
+
+class InfoPage:
+    """A table of infos of all of n walkers, and the views of it that an ``info`` hands out: made once, used for step after step.
+
+    To make the views anew takes as long as stepping a dozen walkers. ``is_free`` tells whether the arrays of an earlier ``info`` are in nobody's
+    hands any more; a view of one of them, or a tensor that shares its memory, counts as well.
+    """
+
+    def __init__(self, maker: InfoMaker, n: int) -> None:
+        everyone = np.ones(n, dtype=np.bool_)
+        everyone.flags.writeable = False
+        self.table = np.empty((n, maker.size))
+        self._falls = np.zeros(n, dtype=np.int64)
+        self._info = maker.many(self.table, self._falls, everyone)
+        told = [array for key, array in self._info.items() if not key.startswith("_")]
+        self._arrays = [self.table, *told]
+        del told
+        self._references = self._count()
+
+    def is_free(self) -> bool:
+        """Whether nobody but this page holds its arrays."""
+        return self._count() == self._references
+
+    def info(self, falls: NDArray[np.int64]) -> dict[str, Any]:
+        """The ``info`` of the table as it is filled."""
+        self._falls[:] = falls
+        return self._info.copy()
+
+    def _count(self) -> int:
+        return sum(map(sys.getrefcount, self._arrays))
+
+
+class InfoPages:
+    """As many pages as are in use at a time.
+
+    Parameters
+    ----------
+    maker : InfoMaker
+    n : int
+        Walkers.
+    """
+
+    def __init__(self, maker: InfoMaker, n: int) -> None:
+        self._maker = maker
+        self._n = n
+        self._pages: deque[InfoPage] = deque(maxlen=_MOST_PAGES)
+
+    def take(self) -> InfoPage:
+        """A page to fill: one that is free again, or a new one."""
+        for page in self._pages:
+            if page.is_free():
+                return page
+        page = InfoPage(self._maker, self._n)
+        self._pages.append(page)
+        return page

@@ -104,7 +104,7 @@ def judge(
     observations : float32 (n, numbers), written
     rewards : (n,), written by steps
     ends : bool (2, n), written by steps: terminated, truncated
-    infos : records (n,), written, or (0,) for none
+    infos : (n, numbers), written, or (0, numbers) for none
     skip : bool (n,)
     """
     walkers, tasks, settings = borrowed(walkers), borrowed(tasks), borrowed(settings)

@@ -12,11 +12,12 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from lean_yaw_env.envs.info import InfoPages
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, action_space
 from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.envs.snapshots import State, restore, state_of
-from lean_yaw_env.envs.state import Records
 from lean_yaw_env.envs.tasks import Task, task_named
+from lean_yaw_env.parameters import Vector
 from lean_yaw_env.threads import share_out
 from lean_yaw_env.validation import require_count
 
@@ -93,7 +94,8 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._generators: list[np.random.Generator] | None = None
         self._ended = np.ones(self.num_envs, dtype=np.bool_)
-        self._tells_ends = step_info
+        self._tells_episodes = step_info
+        self._pages = InfoPages(self.simulation.info, self.num_envs)
 
     def reset(
         self,
@@ -110,7 +112,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         mask = self._reset_mask(placement.pop("reset_mask", None))
         self.simulation.check_options(placement)
         self._seed(seed, mask)
-        infos = self.simulation.new_infos(cleared=True) if self.step_info else None
+        infos = self.simulation.new_infos(cleared=True) if self._tells_episodes else None
         self._begin(mask, infos)
         if placement:
             self.simulation.place(mask, placement, infos)
@@ -123,13 +125,14 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         if self._generators is None:
             raise gym.error.ResetNeeded("call reset() before the first step")
         simulation = self.simulation
-        restarts = self._ended.any()
+        restarts = np.count_nonzero(self._ended) > 0
         if restarts and self.autoreset_mode is AutoresetMode.DISABLED:
             raise gym.error.ResetNeeded(
                 f"walkers {np.flatnonzero(self._ended).tolist()} have ended; reset them by options={{'reset_mask': ...}}"
             )
         simulation.actions[:] = self._require_actions(actions)
-        infos = simulation.new_infos() if self.step_info else None
+        page = self._pages.take() if self.step_info else None
+        infos = None if page is None else page.table
         simulation.renew_results()
         share_out(
             lambda first, last: simulation.step_many(self._ended, first, last, infos),
@@ -140,10 +143,13 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
             self._begin(self._ended.copy(), infos)
         rewards, (terminated, truncated) = simulation.rewards, simulation.ends
         np.logical_or(terminated, truncated, out=self._ended)
+        ends = np.count_nonzero(self._ended) > 0
+        if ends:
+            simulation.note_failures()
         final: dict[str, Any] = {}
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and ends:
             final = self._restart_in_same_step(infos)
-        info = self._told(infos, np.ones(self.num_envs, dtype=np.bool_))
+        info = {} if page is None else page.info(simulation.falls)
         return self._observations(), rewards, terminated, truncated, final | info
 
     def get_state(self) -> State:
@@ -183,7 +189,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
             raise ValueError(
                 f"actions must have shape ({self.num_envs}, {ACTION_SIZE}), got {chosen.shape}"
             )
-        if not np.isfinite(chosen).all():
+        if np.count_nonzero(np.isfinite(chosen)) < chosen.size:
             bad = ~np.isfinite(chosen).all(axis=1) & ~self._ended
             if bad.any():
                 raise ValueError(
@@ -191,18 +197,19 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
                 )
         return chosen
 
-    def _restart_in_same_step(self, infos: Records | None) -> dict[str, Any]:
+    def _restart_in_same_step(self, infos: Vector | None) -> dict[str, Any]:
         """Keep what the ended episodes ended with, then begin new ones."""
         mask = self._ended.copy()
         observations = np.full(self.num_envs, None, dtype=object)
-        for i in np.flatnonzero(mask):
+        for i in np.flatnonzero(mask).tolist():
             observations[i] = self._observation(i)
         final = {"final_obs": observations, "_final_obs": mask}
-        if self._tells_ends:
+        if self._tells_episodes:
             told = self._told(self.simulation.report(mask), mask)
             final |= {"final_info": told, "_final_info": mask}
         self._begin(mask, infos)
         return final
+
     def _reset_mask(self, mask: Any) -> NDArray[np.bool_]:
         if mask is None:
             return np.ones(self.num_envs, dtype=np.bool_)
@@ -237,7 +244,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
             if seeds[i] is not None:
                 self._generators[i] = seeding.np_random(seeds[i])[0]
 
-    def _begin(self, mask: NDArray[np.bool_], infos: Records | None) -> None:
+    def _begin(self, mask: NDArray[np.bool_], infos: Vector | None) -> None:
         assert self._generators is not None
         self.simulation.start(mask, self._generators, infos)
         self._ended[mask] = False
@@ -249,5 +256,8 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
     def _observation(self, row: int) -> Any:
         return self.simulation.observations[row].copy()
 
-    def _told(self, infos: Records | None, mask: NDArray[np.bool_]) -> dict[str, Any]:
-        return {} if infos is None else self.simulation.info.many(infos, mask)
+    def _told(self, infos: Vector | None, mask: NDArray[np.bool_]) -> dict[str, Any]:
+        if infos is None:
+            return {}
+        falls = np.where(mask, self.simulation.falls, 0)
+        return self.simulation.info.many(infos, falls, mask)

@@ -90,6 +90,7 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         self.observation_space = self.options.observation_space(self.task)
         self.action_space = action_space()
         self._infos = self.simulation.new_infos()
+        self._views = self.simulation.info.views(self._infos[0])
         self._running = False
         self._renderer = None if render_mode is None else Renderer()
         self._footage: Footage | None = None
@@ -110,7 +111,7 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
             simulation.place(_ONE, options, self._infos)
         self._running = True
         self._begin_footage()
-        return simulation.observations[0].copy(), simulation.info.one(self._infos)
+        return simulation.observations[0].copy(), self._info()
 
     def step(
         self, action: ArrayLike
@@ -126,6 +127,8 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         if not simulation.step_one(self._infos):
             raise ValueError(f"action must be numbers in [-1, 1], got {chosen.tolist()}")
         (terminated,), (truncated,) = simulation.ends.tolist()
+        if terminated:
+            simulation.note_failures()
         self._running = not (terminated or truncated)
         if self._footage is not None:
             self._footage.extend()
@@ -135,7 +138,7 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
             simulation.rewards.item(),
             terminated,
             truncated,
-            simulation.info.one(self._infos),
+            self._info(),
         )
 
     def get_state(self) -> State:
@@ -145,7 +148,9 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         (``envs.state.WALKER_FIELDS``, ``Task.fields``).
         """
         if not self._running:
-            raise ResetNeeded("call reset() before get_state(): the episode is over or has not begun")
+            raise ResetNeeded(
+                "call reset() before get_state(): the episode is over or has not begun"
+            )
         return state_of(self.simulation, [self.np_random])
 
     def set_state(self, state: State) -> None:
@@ -187,6 +192,9 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         if self._renderer is not None:
             self._renderer.close()
 
+    def _info(self) -> dict[str, Any]:
+        return self.simulation.info.one(self._views, self.simulation.falls[0])
+
     def _begin_footage(self) -> None:
         if self._renderer is not None:
             self._footage = Footage(self.simulation)
@@ -197,5 +205,4 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
             self._renderer.show(self._footage.scene(self._fall()), RENDER_FPS)
 
     def _fall(self) -> str | None:
-        code = FallCode(self.simulation.walkers["fall"][0])
-        return code.description if code else None
+        return FallCode(self.simulation.falls[0]).word

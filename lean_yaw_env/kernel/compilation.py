@@ -16,7 +16,7 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
-from numba import config, njit
+from numba import config, njit, typeof
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
@@ -139,7 +139,9 @@ def _digest(function: Callable[..., Any], formulas: Iterable[Callable[..., Any]]
     return digest.hexdigest()
 
 
-def entry_point(formulas: Iterable[Callable[..., Any]] = (), **options: Any) -> Callable[[Callable[..., Any]], Any]:
+def entry_point(
+    formulas: Iterable[Callable[..., Any]] = (), **options: Any
+) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function that Python calls, releasing the GIL, and keep its machine code on disk.
 
     Numba renews its cache when the entry point's own file changes, but not when a formula inlined from another file does. A digest
@@ -178,6 +180,18 @@ def entry_point_with(
     names |= {part: formula(_rebound(names[part], names, part)) for part in parts}
     function = _rebound(template, names, f"{template.__name__}_{name}")
     return entry_point(tuple(formulas.values()))(function)
+
+
+def for_types_of(entry: Any, *arguments: Any) -> Callable[..., Any]:
+    """An entry point compiled for arguments of these types, without the search for them at each call, which takes longer than a small step.
+
+    What it is called with must have the same types, dimensions and memory layouts: nobody checks.
+    """
+    if not hasattr(entry, "overloads"):  # NUMBA_DISABLE_JIT=1 leaves a plain function
+        return entry
+    signature = tuple(typeof(argument) for argument in arguments)
+    entry.compile(signature)
+    return entry.overloads[signature].entry_point
 
 
 def _rebound(function: Any, names: dict[str, Any], name: str) -> Any:

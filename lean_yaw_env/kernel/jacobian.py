@@ -169,14 +169,14 @@ def _end(work, body, command, heading, side):
 def step_jacobian(
     body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side, state, jacobian
 ):
-    """Write the next section state (5,) and the derivatives (k, 8) of the first k of ``OUTPUTS`` by state and command; return how the
-    step ended.
+    """Write the first k of ``OUTPUTS`` (k,), 5 of them the next section state, and their derivatives (m, 8) by state and command; return
+    how the step ended.
     """
     work = np.zeros(2 * _IMAGINARY)
     _begin(work, body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side)
     _fly(work, body, command, heading, side)
     _end(work, body, command, heading, side)
-    for k in range(STATE_SIZE):
+    for k in range(state.shape[0]):
         state[k] = work[(k + 1) * INPUTS]
     for k in range(jacobian.shape[0]):
         place = (k + 1) * INPUTS

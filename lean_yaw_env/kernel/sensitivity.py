@@ -14,7 +14,7 @@ INPUTS = 14
 
 @entry_point()
 def step_sensitivity(body, command, state, side, after, jacobian):
-    """Write the next section state (5,) and its derivatives (5, 14); return how the step ended."""
+    """Write ``jacobian.OUTPUTS`` (10,) and their derivatives (10, 14); return how the step ended."""
     status = 0.0
     for column in range(INPUTS):
         seed = 1j * _TINY
@@ -49,11 +49,21 @@ def step_sensitivity(body, command, state, side, after, jacobian):
         jacobian[2, column] = outcome.ankle_angle.imag / _TINY
         jacobian[3, column] = outcome.stance_pitch_rate.imag / _TINY
         jacobian[4, column] = outcome.ankle_rate.imag / _TINY
+        jacobian[5, column] = outcome.duration.imag / _TINY
+        jacobian[6, column] = outcome.displacement_x.imag / _TINY
+        jacobian[7, column] = outcome.displacement_z.imag / _TINY
+        jacobian[8, column] = outcome.mass_offset.imag / _TINY
+        jacobian[9, column] = outcome.shift_work.imag / _TINY
         if column == 0:
             after[0] = outcome.heading.real
             after[1] = outcome.stance_pitch.real
             after[2] = outcome.ankle_angle.real
             after[3] = outcome.stance_pitch_rate.real
             after[4] = outcome.ankle_rate.real
+            after[5] = outcome.duration.real
+            after[6] = outcome.displacement_x.real
+            after[7] = outcome.displacement_z.real
+            after[8] = outcome.mass_offset.real
+            after[9] = outcome.shift_work.real
             status = outcome.status
     return status

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from lean_yaw_env.analysis import planar_gait_rate
-from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import Check, compare, judge
+from lean_yaw_env.paper.numbers import CRITICAL_TILTS, PASSIVE_SLOPE, number, numbers_of, statement
 from lean_yaw_env.paper.results import Result
 from lean_yaw_env.paper.velocity_figure import flat_critical_speed
 from lean_yaw_env.paper.walkers import FlatGait, flat_active_walker
@@ -18,12 +18,12 @@ _LINEAR = 0.99
 
 def active_claims() -> Result:
     """The heuristic that the critical speed is the ankle tilt, and how steep a slope may be."""
-    gentle = FlatGait.of(flat_active_walker(numbers.PASSIVE_SLOPE))
+    gentle = FlatGait.of(flat_active_walker(PASSIVE_SLOPE))
     usual = FlatGait.of(flat_active_walker())
     points = [
         (gentle.cycle.speed, gentle.stable_tilts(0.13, 0.17)[1]),
         (usual.cycle.speed, usual.stable_tilts(0.1, 0.8)[1]),
-        *((flat_critical_speed(tilt), tilt) for tilt in numbers.CRITICAL_TILTS),
+        *((flat_critical_speed(tilt), tilt) for tilt in CRITICAL_TILTS),
     ]
     return Result(
         (*_speed_checks(points), steep_slope_check()),
@@ -39,12 +39,12 @@ def active_claims() -> Result:
 def _speed_checks(points: list[tuple[float, float]]) -> list[Check]:
     checks = [
         compare(
-            number,
+            printed,
             speed / tilt,
             remark=f"v = {speed:.3f} at α = {tilt:.3f}.",
             unless="The straight line through the four points does not pass through zero.",
         )
-        for number, (speed, tilt) in zip(numbers.SPEED_IS_TILT, points, strict=True)
+        for printed, (speed, tilt) in zip(numbers_of("v_min over α"), points, strict=True)
     ]
     speeds, tilts = np.array(points).T
     slope, offset = np.polyfit(tilts, speeds, 1)
@@ -52,17 +52,17 @@ def _speed_checks(points: list[tuple[float, float]]) -> list[Check]:
     explained = 1.0 - float(apart.var() / speeds.var())
     checks.append(
         compare(
-            numbers.SPEED_PER_TILT,
+            number("one-to-one"),
             float(slope),
             remark=f"v_min = {slope:.3f} α {offset:+.3f} through the four points.",
         )
     )
     checks.append(
         judge(
-            numbers.SPEED_IS_LINEAR,
+            statement("linear"),
             explained >= _LINEAR,
             ours=f"{explained:.1%} explained; at most {np.abs(apart).max():.3f} from the line",
-            remark="" if explained >= _LINEAR else "They are farther from it.",
+            unless="They are farther from it.",
         )
     )
     return checks
@@ -87,7 +87,7 @@ def steep_slope_check() -> Check:
     """Section 4.2: any arbitrarily steep slope."""
     slope = lift_off_slope()
     return judge(
-        numbers.ANY_SLOPE,
+        statement("steep slopes"),
         False,
         ours=f"{slope:.4f}",
         remark="There the floor would have to pull at the foot. The paper's foot is held to the floor "

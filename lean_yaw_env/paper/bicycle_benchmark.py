@@ -10,8 +10,8 @@ import sys
 import numpy as np
 
 from lean_yaw_env.errors import LeanYawError
-from lean_yaw_env.paper import classic_numbers as numbers
 from lean_yaw_env.paper.checks import Check, compare, judge
+from lean_yaw_env.paper.numbers import numbers_of, statement
 from lean_yaw_env.paper.results import Result, Section
 from lean_yaw_env.vehicles import (
     BENCHMARK_2007,
@@ -58,15 +58,15 @@ def _published_checks() -> list[Check]:
     )
     entries = np.concatenate([matrix.ravel() for matrix in matrices])
     checks = [
-        compare(number, float(entry))
-        for number, entry in zip(numbers.BICYCLE_MATRICES, entries, strict=True)
+        compare(printed, float(entry))
+        for printed, entry in zip(numbers_of("matrix "), entries, strict=True)
     ]
     branches = follow_eigenvalues(benchmark_bicycle(), [_SPEED])
     weave, capsize, caster = branches.weave[0, 0], branches.capsize[0], branches.caster[0]
     values = (caster.real, capsize.real, weave.real, abs(weave.imag))
     return checks + [
-        compare(number, float(value))
-        for number, value in zip(numbers.BICYCLE_EIGENVALUES, values, strict=True)
+        compare(printed, float(value))
+        for printed, value in zip(numbers_of("eigenvalue, "), values, strict=True)
     ]
 
 
@@ -85,7 +85,10 @@ def _their_parameters() -> dict[str, float]:
         named |= {f"I{letter}xx": wheel.inertia_xx, f"I{letter}yy": wheel.inertia_yy}
     for letter, body in (("B", p.rear_frame), ("H", p.front_frame)):
         named |= {f"m{letter}": body.mass, f"x{letter}": body.x, f"z{letter}": body.z}
-        named |= {f"I{letter}{axes}": getattr(body, f"inertia_{axes}") for axes in ("xx", "xz", "yy", "zz")}
+        named |= {
+            f"I{letter}{axes}": getattr(body, f"inertia_{axes}")
+            for axes in ("xx", "xz", "yy", "zz")
+        }
     return named
 
 
@@ -116,8 +119,8 @@ def _second_opinion() -> Check:
     ]
     holds = bool(max(apart) < 1e-9)
     return judge(
-        numbers.CARVALLO_WHIPPLE,
+        statement("Carvallo-Whipple, BicycleParameters"),
         holds,
         ours=f"at most {max(apart):.0e} 1/s apart, at {_SPEEDS.size} speeds",
-        remark="" if holds else "They differ.",
+        unless="They differ.",
     )

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from lean_yaw_env.paper.printed import PaperNumber, Statement
+from lean_yaw_env.paper.numbers import PaperNumber, Statement
 
 Verdict = Literal["agrees", "agrees within rounding", "differs", "open"]
 VERDICTS: tuple[Verdict, ...] = ("agrees", "agrees within rounding", "differs", "open")
@@ -105,7 +105,7 @@ def compare(
 
 
 def judge(
-    statement: Statement, holds: bool, *, ours: str, remark: str = "", is_open: bool = False
+    statement: Statement, holds: bool, *, ours: str, remark: str = "", unless: str = ""
 ) -> Check:
     """Judge a statement that is not one number.
 
@@ -116,9 +116,9 @@ def judge(
     ours : str
         What we find, with its numbers.
     remark : str
-        Said in any case; needed where it does not hold.
-    is_open : bool
-        Whether a disagreement is unexplained.
+        Said in any case.
+    unless : str
+        Said if it does not hold; one of the two is needed then.
     """
     return Check(
         name=statement.name,
@@ -128,8 +128,8 @@ def judge(
         ours=ours,
         difference=None,
         allowed=statement.criterion,
-        verdict="agrees" if holds else "open" if is_open else "differs",
-        remark=remark,
+        verdict="agrees" if holds else "differs",
+        remark=" ".join(filter(None, [remark, "" if holds else unless])),
     )
 
 

@@ -10,7 +10,7 @@ from scipy.optimize import fsolve
 
 from lean_yaw_env.analysis import PassiveMap, continue_gait, find_limit_cycle, find_periodic_gait
 from lean_yaw_env.multibody import MultibodyWalker, table3_c_eigenvalues
-from lean_yaw_env.paper import numbers
+from lean_yaw_env.paper.numbers import FLAT_TILT, PASSIVE_SLOPE, number, numbers_of
 from lean_yaw_env.paper.results import Columns, Section
 from lean_yaw_env.paper.slope_limits import doubling_slope, lateral_limit_slope
 from lean_yaw_env.paper.walkers import (
@@ -57,21 +57,21 @@ def forward_difference_pair(width: float) -> Vector:
 
 def nearest_pair(points: int = 21) -> tuple[float, Vector]:
     """The pair nearest the paper's over all tilts and slopes that round to its own, and how near."""
-    slopes = numbers.PASSIVE_SLOPE + np.linspace(-5e-6, 5e-6, 5)
+    slopes = PASSIVE_SLOPE + np.linspace(-5e-6, 5e-6, 5)
     pairs = []
     for slope in slopes:
         gait = FlatGait.of(flat_passive_walker(slope))
-        for tilt in numbers.FLAT_TILT + np.linspace(-0.005, 0.005, points * 10):
+        for tilt in FLAT_TILT + np.linspace(-0.005, 0.005, points * 10):
             matrix = gait.section_map.moved("ankle_tilt", tilt).derivative(gait.cycle.state)[1]
             pairs.append(_pair(matrix[np.ix_(LATERAL, LATERAL)]))
-    paper = np.array([number.value for number in numbers.TABLE_3_C[3:5]])
+    paper = np.array([printed.value for printed in numbers_of("C: λ")[3:5]])
     apart = np.abs(np.array(pairs) - paper).max(axis=1)
     return float(apart.min()), pairs[int(apart.argmin())]
 
 
 def lateral_pair_section() -> Section:
     """Table 3, C."""
-    paper = np.array([number.value for number in numbers.TABLE_3_C[3:5]])
+    paper = np.array([printed.value for printed in numbers_of("C: λ")[3:5]])
     ours = lateral_pair(flat_passive_walker())
     usual = flat_passive_walker().parameters
     tried: list[tuple[str, Vector]] = [("the paper", paper), ("ours", ours)]
@@ -128,7 +128,7 @@ def maximal_slope_section() -> Section:
     leaving = [event.value for event in branch.events if event.is_leaving]
     wider = replace(walker, parameters=replace(walker.parameters, foot_radius=0.5045))
     rows = (
-        ("the paper", numbers.MAXIMAL_SLOPE.printed),
+        ("the paper", number("maximal slope, C").printed),
         (
             "the gait's period doubles, which ends its stability",
             f"{doubling_slope(walker, (0.0003, 0.08)):.4f}",
@@ -179,7 +179,7 @@ def finite_mass_heading(foot_mass: float = _FOOT_MASS) -> float:
 
 def heading_section() -> Section:
     """Table 2's and Figure 14's heading."""
-    gait, paper = table_1_gait(), numbers.FOOTPRINT_ANGLE
+    gait, paper = table_1_gait(), number("footprint angle")
     heading = float(gait.state[0])
     missing = paper.value - heading
     slowest = float(gait.eigenvalues[0].real)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from lean_yaw_env.analysis import find_limit_cycle, largest_disturbance, modes
-from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import Check, compare, judge
+from lean_yaw_env.paper.numbers import number, statement
 from lean_yaw_env.paper.open_points import maximal_slope_section
 from lean_yaw_env.paper.passive_figures import tilt_check
 from lean_yaw_env.paper.results import Result
 from lean_yaw_env.paper.slope_limits import doubling_slope, lateral_limit_slope
 from lean_yaw_env.paper.walkers import (
-    FlatGait,
     arc_foot_walker,
     flat_passive_walker,
     passive_gait,
@@ -46,13 +45,13 @@ def least_deviation(walker: PassiveWalker) -> tuple[float, str]:
 def _slope_checks() -> list[Check]:
     return [
         compare(
-            numbers.SLOPE_LIMIT_A,
+            number("slope limit, A"),
             doubling_slope(point_foot_walker(), (0.001, 0.03)),
             remark="Where the gait's period doubles; gaits of longer periods are stable a little "
             "further, to 0.019.",
         ),
         compare(
-            numbers.MAXIMAL_SLOPE,
+            number("maximal slope, C"),
             doubling_slope(arc_foot_walker(), (0.0003, 0.08)),
             unless="Fore-aft the gait is stable to where its period doubles, 1.3 % short of the "
             f"paper's slope. No ankle tilt keeps the flat walker upright beyond {lateral_limit_slope():.4f}.",
@@ -63,15 +62,14 @@ def _slope_checks() -> list[Check]:
 
 def _basin_checks() -> list[Check]:
     checks = []
-    for statement, walker in zip(
-        numbers.BASINS, (point_foot_walker(), arc_foot_walker()), strict=True
-    ):
+    for name, walker in (("A", point_foot_walker()), ("B", arc_foot_walker())):
+        printed = statement(f"basin, {name}")
         share, what = least_deviation(walker)
-        percent = int(statement.printed.split()[0])
+        percent = int(printed.printed.split()[0])
         holds = percent <= 100.0 * share < percent + 1
         checks.append(
             judge(
-                statement,
+                printed,
                 holds,
                 ours=f"{100.0 * share:.2f} %",
                 remark=f"The least over both signs and all initial conditions, one at a time ({what}).",
@@ -86,7 +84,7 @@ def _mode_check() -> Check:
     fore_aft = kinds.count("fore-aft")
     pure = all(min(share, 1.0 - share) < 1e-9 for share in shares)
     return judge(
-        numbers.MODES_C,
+        statement("modes, C"),
         fore_aft == 3,
         ours=f"{fore_aft} fore-aft, {len(kinds) - fore_aft} three-dimensional"
         + (", each purely so" if pure else ""),
@@ -102,11 +100,11 @@ def _steeper_checks() -> list[Check]:
     pitch = float(gait.state[1])
     return [
         compare(
-            numbers.PITCH_AT_0004,
+            number("stance leg angle at γ = 0.004"),
             pitch,
             remark=f"The stance leg's angle, not the step length, which is {gait.step_length:.3f}.",
         ),
-        tilt_check(numbers.TILT_AT_0004, _STEEP, (pitch - 0.03, pitch + 0.03)),
+        tilt_check(statement("stable tilt at γ = 0.004"), _STEEP, (pitch - 0.03, pitch + 0.03)),
     ]
 
 

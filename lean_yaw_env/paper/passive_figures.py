@@ -10,11 +10,10 @@ from scipy.optimize import brentq
 
 from lean_yaw_env.analysis import PassiveMap
 from lean_yaw_env.analysis.fixed_point import solve_fixed_point
-from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import Check, compare, judge
 from lean_yaw_env.paper.drawing import FAINT, name_axes, new_figure, picture_of
 from lean_yaw_env.paper.multiplier_curves import MultiplierCurves, along_tilt, draw_curves
-from lean_yaw_env.paper.printed import Statement
+from lean_yaw_env.paper.numbers import PASSIVE_SLOPE, POINT_FOOT_SLOPE, Statement, number, statement
 from lean_yaw_env.paper.results import Result
 from lean_yaw_env.paper.walkers import (
     FlatGait,
@@ -100,17 +99,17 @@ def figure_7() -> Result:
 def _gait_checks(points: tuple[float, float], arcs: tuple[float, float]) -> tuple[Check, ...]:
     same = round(arcs[1], 2) == round(points[1], 2)
     return (
-        compare(numbers.POINT_FOOT_PITCH, points[0]),
-        compare(numbers.ARC_FOOT_PITCH, arcs[0]),
+        compare(number("stance leg angle, A"), points[0]),
+        compare(number("stance leg angle, B"), arcs[0]),
         judge(
-            numbers.SAME_VELOCITY,
+            statement("velocity of A and B"),
             same,
             ours=f"A {points[1]:.4f}, B {arcs[1]:.4f}, {abs(arcs[1] / points[1] - 1.0):.1%} apart",
-            remark="" if same else "They round to different numbers.",
+            unless="They round to different numbers.",
         ),
         compare(
-            numbers.EFFICIENCY,
-            numbers.POINT_FOOT_SLOPE / slope_of_pitch(points[0]),
+            number("efficiency"),
+            POINT_FOOT_SLOPE / slope_of_pitch(points[0]),
             remark="The cost of transport is the slope.",
         ),
     )
@@ -123,7 +122,7 @@ def slope_of_pitch(pitch: float) -> float:
     def excess(slope: float) -> float:
         return float(solve_fixed_point(PassiveMap(arc_foot_walker(slope)), state)[1]) - pitch
 
-    usual = numbers.PASSIVE_SLOPE
+    usual = PASSIVE_SLOPE
     return float(brentq(excess, 0.95 * usual, 1.05 * usual, xtol=1e-9))  # pyright: ignore[reportArgumentType]
 
 
@@ -145,7 +144,7 @@ def figure_8() -> Result:
     """Figure 8 with its check."""
     curves = passive_multipliers()
     return Result(
-        checks=(tilt_check(numbers.STABLE_TILT_PASSIVE, numbers.PASSIVE_SLOPE, _TILTS_8),),
+        checks=(tilt_check(statement("stable tilt, passive"), PASSIVE_SLOPE, _TILTS_8),),
         tables={"figure8": curves.columns()},
         picture=picture_of(draw_passive_multipliers(curves)),
         caption=(
@@ -156,14 +155,14 @@ def figure_8() -> Result:
     )
 
 
-def tilt_check(statement: Statement, slope: float, within: tuple[float, float]) -> Check:
+def tilt_check(printed: Statement, slope: float, within: tuple[float, float]) -> Check:
     """Whether the ankle tilt that the paper names is stable, and none of another second decimal."""
     low, high = FlatGait.of(flat_passive_walker(slope)).stable_tilts(*within)
-    named = float(statement.printed.split()[-1])
+    named = float(printed.printed.split()[-1])
     holds = low < named < high and round(low, 2) == named == round(high, 2)
     return judge(
-        statement,
+        printed,
         holds,
         ours=f"stable from {low:.5f} to {high:.5f}",
-        remark="" if holds else "It is not so.",
+        unless="It is not so.",
     )

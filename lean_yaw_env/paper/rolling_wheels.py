@@ -9,8 +9,8 @@ from scipy.optimize import brentq
 
 from lean_yaw_env.analysis import PassiveMap, find_limit_cycle, find_passive_gaits, planar_gait_rate
 from lean_yaw_env.errors import NoGaitError
-from lean_yaw_env.paper import classic_numbers as numbers
 from lean_yaw_env.paper.checks import Check, judge
+from lean_yaw_env.paper.numbers import statement
 from lean_yaw_env.paper.results import Result
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.passive import FORE_AFT, PassiveWalker
@@ -19,6 +19,7 @@ from lean_yaw_env.walker import Walker
 _WHEELS = ((math.pi / 8.0, 0.2), (0.15, 0.02), (0.3, 0.1))
 """Half the angle between two spokes, and slope, rad."""
 _RADII = (0.2, 0.5, 0.8)
+_UNLESS = "It does not hold."
 _NEARLY_ROUND, _SMALL_STEP = 0.9999, 0.01
 _WALKING_SLOPE = 0.004
 
@@ -42,10 +43,6 @@ def rolling_wheels() -> Result:
     )
 
 
-def _named(holds: bool) -> str:
-    return "" if holds else "It does not hold."
-
-
 def _rimless_checks() -> list[Check]:
     worst = max(rate_error(slope, half) for half, slope in _WHEELS)
     multipliers = [
@@ -63,22 +60,22 @@ def _rimless_checks() -> list[Check]:
     angles = ", ".join(f"{half:.3f}" for half, _ in _WHEELS)
     return [
         judge(
-            numbers.RIMLESS_RATE,
+            statement("rimless wheel, rate"),
             good,
             ours=f"relative {worst:.0e} at α = {angles}",
-            remark=_named(good),
+            unless=_UNLESS,
         ),
         judge(
-            numbers.RIMLESS_MULTIPLIER,
+            statement("rimless wheel, multiplier"),
             multiplies,
             ours=f"{max(multipliers):.0e} at α = {angles}",
-            remark=_named(multiplies),
+            unless=_UNLESS,
         ),
         judge(
-            numbers.RIMLESS_SLOPE,
+            statement("rimless wheel, least slope"),
             ends,
             ours=", ".join(f"{slope:.5f}" for slope in least) + f" at α = {angles}",
-            remark=_named(ends),
+            unless=_UNLESS,
         ),
     ]
 
@@ -104,7 +101,12 @@ def _has_gait(half_angle: float, slope: float) -> bool:
 def _rolling_check() -> Check:
     worst = max(rate_error(0.01, 0.15, radius) for radius in _RADII)
     holds = worst < 1e-10
-    return judge(numbers.ROLLING_RATE, holds, ours=f"relative {worst:.0e}", remark=_named(holds))
+    return judge(
+        statement("wheel with round feet"),
+        holds,
+        ours=f"relative {worst:.0e}",
+        unless=_UNLESS,
+    )
 
 
 def synthetic_step_time() -> float:
@@ -126,10 +128,10 @@ def _synthetic_check() -> Check:
     step = walker.step(start)
     holds = step.fall is None and abs(step.duration / time - 1.0) < 1e-4
     return judge(
-        numbers.SYNTHETIC_WHEEL,
+        statement("synthetic wheel"),
         holds,
         ours=f"{step.duration:.4f}, the equation's root {time:.4f}",
-        remark=_named(holds),
+        unless=_UNLESS,
     )
 
 
@@ -146,7 +148,7 @@ def _lateral_check() -> Check:
     same = float(np.abs(fore_aft - np.sort_complex(planar.eigenvalues)).max())
     holds = beyond.size == 1 and beyond[0].real < 0.0 and beyond[0].imag == 0.0 and same < 1e-6
     return judge(
-        numbers.LATERAL_MODE,
+        statement("rocking sideways"),
         bool(holds),
         ours=f"{', '.join(f'{value.real:.1f}' for value in beyond)}; the fore-aft ones within {same:.0e}",
         remark="His page has about -30, for legs with masses, which ours have not: that number is not compared. "

@@ -16,8 +16,8 @@ from lean_yaw_env.analysis import (
 )
 from lean_yaw_env.analysis.fixed_point import solve_fixed_point
 from lean_yaw_env.errors import FellError
-from lean_yaw_env.paper import classic_numbers as numbers
 from lean_yaw_env.paper.checks import Check, compare, judge
+from lean_yaw_env.paper.numbers import GARCIA_SLOPE, number, numbers_of, statement
 from lean_yaw_env.paper.results import Result, Section
 from lean_yaw_env.paper.slope_limits import doubling_slope
 from lean_yaw_env.paper.walkers import point_foot_walker
@@ -29,13 +29,13 @@ _END_STEPS = 1000
 
 
 @lru_cache(maxsize=16)
-def gaits(slope: float = numbers.SLOPE) -> tuple[LimitCycle, LimitCycle]:
+def gaits(slope: float = GARCIA_SLOPE) -> tuple[LimitCycle, LimitCycle]:
     """The long and the short gait."""
     long, short = find_passive_gaits(point_foot_walker(slope))
     return long, short
 
 
-def step_multipliers(gait: LimitCycle, slope: float = numbers.SLOPE) -> Vector:
+def step_multipliers(gait: LimitCycle, slope: float = GARCIA_SLOPE) -> Vector:
     """Multipliers of one step, the greatest first."""
     section_map = PassiveMap(point_foot_walker(slope))
     matrix = section_map.derivative(gait.state)[1][np.ix_(section_map.free, section_map.free)]
@@ -56,16 +56,16 @@ def _gait_checks() -> list[Check]:
     # The publications' φ is the swing leg's angle from the stance leg: its rate is the opposite
     ours = np.array([[pitch, rate, -swing] for pitch, rate, swing in states])
     checks = [
-        compare(number, float(value))
-        for number, value in zip(numbers.GARCIA_GAITS, ours[:, :2].ravel(), strict=True)
+        compare(printed, float(value))
+        for printed, value in zip(numbers_of("fixed point, "), ours[:, :2].ravel(), strict=True)
     ]
     checks += [
-        compare(number, float(value))
-        for number, value in zip(numbers.BHOUNSULE_GAITS, ours.ravel(), strict=True)
+        compare(printed, float(value))
+        for printed, value in zip(numbers_of("root, "), ours.ravel(), strict=True)
     ]
     checks += [
-        compare(number, 0.5 * gait.stride_period)
-        for number, gait in zip(numbers.BHOUNSULE_TIMES, gaits(), strict=True)
+        compare(printed, 0.5 * gait.stride_period)
+        for printed, gait in zip(numbers_of("step time, "), gaits(), strict=True)
     ]
     return checks
 
@@ -75,12 +75,12 @@ def _multiplier_checks() -> list[Check]:
     ours = (long[0].real, long[0].imag, short[0].real, short[1].real)
     return [
         compare(
-            number,
+            printed,
             float(value),
             unless="His Jacobian is of differences of steps that were integrated to 1e-10. Garcia's "
             "equations, integrated with thirty digits by another program, give ours.",
         )
-        for number, value in zip(numbers.GARCIA_MULTIPLIERS, ours, strict=True)
+        for printed, value in zip(numbers_of("multiplier, "), ours, strict=True)
     ]
 
 
@@ -96,21 +96,21 @@ def _statement_checks() -> list[Check]:
     ratio = float((slopes[-2] - slopes[-3]) / (slopes[-1] - slopes[-2]))
     doubles = abs(ratio / _FEIGENBAUM - 1.0) < 0.01
     return [
-        judge(numbers.ONE_STABLE, one, ours="two each", remark="" if one else "It is not so."),
-        compare(numbers.STABLE_BELOW, limit),
+        judge(statement("two gaits"), one, ours="two each", unless="It is not so."),
+        compare(number("stable below"), limit),
         judge(
-            numbers.CUBE_ROOT,
+            statement("scaling"),
             bool(scales),
             ours=f"{angle:.4f} and {power:.3f}",
-            remark="" if scales else "Other exponents.",
+            unless="Other exponents.",
         ),
         judge(
-            numbers.TO_CHAOS,
+            statement("to chaos"),
             doubles,
             ours=", ".join(f"{slope:.6f}" for slope in slopes) + f"; last ratio {ratio:.3f}",
-            remark="" if doubles else "The ratio is another one.",
+            unless="The ratio is another one.",
         ),
-        compare(numbers.WALKING_ENDS, end_of_walking()),
+        compare(number("end of walking"), end_of_walking()),
     ]
 
 
@@ -172,14 +172,14 @@ def small_slopes(gait: LimitCycle, points: int = _SERIES_POINTS) -> SmallSlopes:
     Parameters
     ----------
     gait : LimitCycle
-        At the slope ``numbers.SLOPE``, from where it is followed.
+        At the slope ``GARCIA_SLOPE``, from where it is followed.
     points : int
         Places; the polynomials pass through all of them.
     """
     low, high = np.array(_SERIES_SLOPES) ** (2.0 / 3.0)
     places = np.cos(np.pi * (2.0 * np.arange(points) + 1.0) / (2.0 * points))
     powers = 0.5 * (low + high) + 0.5 * (high - low) * places
-    state, before, rows = gait.state.copy(), numbers.SLOPE, []
+    state, before, rows = gait.state.copy(), GARCIA_SLOPE, []
     for slope in powers**1.5:
         scale = (slope / before) ** (1.0 / 3.0)
         guess = state * np.array([1.0, scale, 1.0, scale, 1.0, scale**3])
@@ -198,23 +198,23 @@ def _first_terms(x: Vector, y: Vector) -> Vector:
 
 def _series_checks() -> list[Check]:
     checks = []
-    for gait, printed in zip(
-        gaits(), (numbers.GARCIA_SERIES[:5], numbers.GARCIA_SERIES[5:]), strict=True
+    for gait, series in zip(
+        gaits(), (numbers_of("series, long"), numbers_of("series, short")), strict=True
     ):
         ours = small_slopes(gait)
         values = (ours.time, ours.angle, ours.angle_slope, ours.ratio, ours.offset)
-        root = numbers.SLOPE ** (1.0 / 3.0)
-        evaluated = printed[1].value * root + printed[2].value * numbers.SLOPE
+        root = GARCIA_SLOPE ** (1.0 / 3.0)
+        evaluated = series[1].value * root + series[2].value * GARCIA_SLOPE
         checks += [
             compare(
-                number,
+                printed,
                 float(value),
-                unless=f"The printed terms give θ = {evaluated:.5f} at γ = {numbers.SLOPE}, where the authors' "
+                unless=f"The printed terms give θ = {evaluated:.5f} at γ = {GARCIA_SLOPE}, where the authors' "
                 f"own program has the fixed point at {gait.state[1]:.5f}; with ours they give "
-                f"{ours.angle * root + ours.angle_slope * numbers.SLOPE:.5f}. All other terms agree, so this one "
+                f"{ours.angle * root + ours.angle_slope * GARCIA_SLOPE:.5f}. All other terms agree, so this one "
                 "is wrong as printed.",
             )
-            for number, value in zip(printed, values, strict=True)
+            for printed, value in zip(series, values, strict=True)
         ]
     return checks
 

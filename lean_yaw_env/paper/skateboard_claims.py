@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import Check, judge
+from lean_yaw_env.paper.numbers import statement
 from lean_yaw_env.vehicles import Skateboard
 
 _TILTS = (0.3, 0.6, 0.9, 1.2)
@@ -59,19 +59,19 @@ def _equation_checks(board: Skateboard) -> tuple[Check, ...]:
     stiffness = [2.0 * (truck_turn(_SMALL_LEAN, tilt) / _SMALL_LEAN) ** 2 for tilt in _TILTS]
     return (
         judge(
-            numbers.EQUATION_1,
+            statement("eq. (1)"),
             off < 1e-6,
             ours=f"largest relative difference {off:.1e} at α = {', '.join(map(str, _TILTS))}",
             remark="Exactly, the circle's radius is w tan α / (2 sin θ).",
         ),
         judge(
-            numbers.EQUATION_2,
+            statement("eq. (2), motion"),
             apart < 1e-12 * float(np.abs(squared).max()),
             ours=f"largest difference {apart:.0e} 1/s²",
             remark="It takes the springs as the paper does; see the next row.",
         ),
         judge(
-            numbers.EQUATION_2_SPRINGS,
+            statement("eq. (2), springs"),
             max(stiffness) < 2.0 * (1.0 + 1e-6),
             ours=f"at α = {', '.join(map(str, _TILTS))}: "
             + ", ".join(f"{value:.2f} k" for value in stiffness),
@@ -81,10 +81,10 @@ def _equation_checks(board: Skateboard) -> tuple[Check, ...]:
             "as the stiffness against lean, as our skateboard does.",
         ),
         judge(
-            numbers.EQUATION_3,
+            statement("eq. (3)"),
             turns,
             ours=f"{speed:.4f} m/s for the default board, both ways",
-            remark="" if turns else "It does not hold.",
+            unless="It does not hold.",
         ),
     )
 
@@ -99,20 +99,20 @@ def _statement_checks(board: Skateboard) -> list[Check]:
     damped = replace(board, damping=5.0).eigenvalues(fast).real
     marginal = board.eigenvalues(fast).real
     rows = (
-        (numbers.SKATEBOARD_STIFF, never, "no growing eigenvalue from 0 to 10 m/s"),
+        (statement("stiff springs"), never, "no growing eigenvalue from 0 to 10 m/s"),
         (
-            numbers.SKATEBOARD_TILT,
+            statement("tilt"),
             bool(np.all(np.diff(speeds) > 0.0)),
             f"α = {', '.join(map(str, _TILTS))}: " + ", ".join(f"{v:.2f}" for v in speeds) + " m/s",
         ),
-        (numbers.SKATEBOARD_MARGINAL, bool((marginal == 0.0).all()), "an imaginary pair"),
+        (statement("undamped"), bool((marginal == 0.0).all()), "an imaginary pair"),
         (
-            numbers.SKATEBOARD_DAMPED,
+            statement("damping"),
             bool((damped < 0.0).all()),
             f"real parts {damped.max():.3f} 1/s",
         ),
     )
     return [
-        judge(statement, holds, ours=ours, remark="" if holds else "It does not hold.")
+        judge(statement, holds, ours=ours, unless="It does not hold.")
         for statement, holds, ours in rows
     ]

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from lean_yaw_env.analysis import largest_disturbance, stride_map
-from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import Check, judge
+from lean_yaw_env.paper.numbers import LARGE_OFFSET, statement
 from lean_yaw_env.paper.results import Result
 from lean_yaw_env.paper.steering import circling_gait, circling_walker
 from lean_yaw_env.paper.walkers import table_1_gait
@@ -41,25 +41,25 @@ def steering_claims() -> Result:
 def _circle_check() -> Check:
     walker, gait = circling_walker(), circling_gait()
     steps = _CIRCLES * math.ceil(2.0 * math.pi / abs(gait.turn)) * 2
-    walk = walker.walk(steps, state=gait.state, mass_offset=numbers.LARGE_OFFSET)
+    walk = walker.walk(steps, state=gait.state, mass_offset=LARGE_OFFSET)
     holds = walk.fall is None and gait.is_stable
     return judge(
-        numbers.CIRCLES,
+        statement("slope that turns"),
         holds,
         ours=f"greatest |λ| {abs(gait.eigenvalues[0]):.3f}, {walk.n_steps} steps walked",
-        remark="" if holds else "It falls, or the circle is unstable.",
+        unless="It falls, or the circle is unstable.",
     )
 
 
 def _limp_check() -> Check:
-    steps = stride_map(circling_walker(), circling_gait().state, mass_offset=numbers.LARGE_OFFSET)
+    steps = stride_map(circling_walker(), circling_gait().state, mass_offset=LARGE_OFFSET)
     left, right = (step.duration for step in steps)
     holds = abs(left / right - 1.0) > 0.01
     return judge(
-        numbers.LIMP,
+        statement("limp"),
         holds,
         ours=f"{left:.3f} on the left foot, {right:.3f} on the right, inner one",
-        remark="" if holds else "It does not limp.",
+        unless="It does not limp.",
     )
 
 
@@ -83,7 +83,7 @@ def _self_steering_check() -> Check:
         limits.append(math.degrees(limit) if home else 0.0)
     holds = min(map(abs, limits)) >= 89.0
     return judge(
-        numbers.SELF_STEERING,
+        statement("self-steering"),
         holds,
         ours=f"from up to {limits[0]:.1f}° to the left and {-limits[1]:.1f}° to the right",
         remark="Beyond a right angle the slope leads uphill, and the walker falls."
@@ -127,7 +127,7 @@ def _asymmetry_check() -> Check:
     same = abs(asymmetric_turn())
     holds = all(abs(turn) > 1e-9 for turn in turns.values()) and same < 1e-9
     return judge(
-        numbers.ASYMMETRY,
+        statement("asymmetry"),
         holds,
         ours="; ".join(f"{name}: {turn:+.1e}" for name, turn in turns.items())
         + f"; none: {same:.0e}",
@@ -159,13 +159,11 @@ def disturbance_checks() -> tuple[Check, ...]:
     raised = {name: recovers(strike, name, 2.0) for name in _NAMES}
     lowered = {name: recovers(strike, name, -1.0) for name in _NAMES if name != _RATE}
     angles = [largest_disturbance(walker, "stance_pitch").relative for walker in (strike, trip)]
-    rates = [
-        largest_disturbance(walker, _RATE, upward=False).relative for walker in (strike, trip)
-    ]
+    rates = [largest_disturbance(walker, _RATE, upward=False).relative for walker in (strike, trip)]
     tens = recovers(strike, _RATE, -0.5) and not recovers(strike, _RATE, -0.6)
     return (
         judge(
-            numbers.DISTURBANCE_UP,
+            statement("disturbance +200 %"),
             all(raised.values()),
             ours=_listed(raised),
             remark="A swing foot that starts below the floor counts as an immediate heel strike here and "
@@ -173,13 +171,13 @@ def disturbance_checks() -> tuple[Check, ...]:
             f"the foot must first rise above the floor, to {angles[1]:+.0%} only.",
         ),
         judge(
-            numbers.DISTURBANCE_DOWN,
+            statement("disturbance -100 %"),
             all(lowered.values()),
             ours=_listed(lowered),
-            remark="" if all(lowered.values()) else "Not all recover.",
+            unless="Not all recover.",
         ),
         judge(
-            numbers.DISTURBANCE_RATE,
+            statement("stance leg's rate"),
             tens,
             ours=f"{rates[0]:.1%}",
             remark=f"With the other contact rule {rates[1]:.1%}."
@@ -208,7 +206,7 @@ def _backward_check(strike: Walker) -> Check:
     others = [f"-{percent} %" for percent, way in falls.items() if way != "backward"]
     tens = all(ways[percent] == "backward" for percent in (60, 70, 80, 90))
     return judge(
-        numbers.FALLS_BACKWARD,
+        statement("beyond -50 %"),
         not others,
         ours=f"{len(falls) - len(others)} of {len(falls)} backward",
         remark=f"Sideways at {', '.join(others)}: just beyond the limit it hardly passes mid-stance, and "

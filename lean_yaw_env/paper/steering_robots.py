@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lean_yaw_env.paper.results import Result, Section
-from lean_yaw_env.paper.steering import circling_radius
+from lean_yaw_env.paper.steering import circling_gait
 from lean_yaw_env.paper.walkers import table_1_gait
 
 _GRAVITY = 9.81
@@ -27,7 +27,7 @@ def steering_robots() -> Result:
             "this walker, Table 1 (simulated)",
             f"{speed:.2f} (gl)^(1/2)",
             f"{froude_number(speed, 1.0, 1.0):.2f}",
-            f"{circling_radius():.1f} (μ = 0.05)",
+            f"{circling_gait().turning_radius:.1f} (μ = 0.05)",
         ),
         ("Mugatu (2023, arXiv 2308.08401)", unread, unread, unread),
         (

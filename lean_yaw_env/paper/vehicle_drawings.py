@@ -96,7 +96,9 @@ def _draw_top(axes: Axes, board: Skateboard) -> None:
     axes.plot(*centre, "k+", markersize=8)
     _measure(axes, (0.0, 0.0), (0.0, -radius), "$r_c$")
     axes.annotate("a", (0.0, -0.25), xytext=(-0.02, 0.02), arrowprops={"arrowstyle": "->"})
-    axes.annotate("v", (half + 0.35, 0.0), xytext=(half + 0.1, -0.02), arrowprops={"arrowstyle": "->"})
+    axes.annotate(
+        "v", (half + 0.35, 0.0), xytext=(half + 0.1, -0.02), arrowprops={"arrowstyle": "->"}
+    )
 
 
 def skateboard_figures() -> Result:

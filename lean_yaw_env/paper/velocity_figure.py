@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from lean_yaw_env.analysis import find_limit_cycle, stability_map
-from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import Check, compare, judge
 from lean_yaw_env.paper.drawing import DARK_GREY, LIGHT_GREY, name_axes, new_figure, picture_of
+from lean_yaw_env.paper.numbers import CRITICAL_TILTS, PASSIVE_SLOPE, number, statement
 from lean_yaw_env.paper.results import Columns, Result
 from lean_yaw_env.paper.walkers import flat_active_walker
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector
@@ -58,7 +58,7 @@ class VelocityMap:
 def velocity_map(slopes: int = 100, radii: int = 91) -> VelocityMap:
     """Figure 13's data."""
     axes = {
-        "ankle_tilt": np.array(numbers.CRITICAL_TILTS),
+        "ankle_tilt": np.array(CRITICAL_TILTS),
         # Closer where it is gentle, for there the speed changes fast
         "slope": np.linspace(_SLOPES[0] ** 0.5, _SLOPES[1] ** 0.5, slopes) ** 2,
         "foot_radius": np.linspace(*_RADII, radii),
@@ -119,24 +119,19 @@ def overestimate(slope: float, foot_radius: float) -> float:
 def boundary_checks() -> tuple[Check, ...]:
     """Critical speeds at foot radius 0.5, and how little they depend on the radius."""
     checks = []
-    for number, statement, tilt in zip(
-        (numbers.CRITICAL_SPEED_PI_8, numbers.CRITICAL_SPEED_PI_4),
-        numbers.ONE_SPEED,
-        numbers.CRITICAL_TILTS,
-        strict=True,
-    ):
+    for name, tilt in zip(("π/8", "π/4"), CRITICAL_TILTS, strict=True):
         speeds = np.array([flat_critical_speed(tilt, radius) for radius in _BOUNDARY_RADII])
         text = ", ".join(f"{v:.3f}" for v in speeds)
         apart = float(np.abs(speeds - speeds.mean()).max())
         checks += [
             compare(
-                number,
+                number(f"critical speed, {name}"),
                 flat_critical_speed(tilt),
                 unless="The boundary is no contour of one speed: the paper's is that of small feet, see "
                 "the next row.",
             ),
             judge(
-                statement,
+                statement(f"boundary is a velocity contour, {name}"),
                 apart <= _ALMOST,
                 ours=f"{text} at r = 0.1, 0.2, 0.4, 0.6, 0.8",
                 remark=f"Within {apart:.4f} of their mean."
@@ -151,20 +146,20 @@ def tilt_checks() -> tuple[Check, ...]:
     """That the speed does not depend on the ankle tilt, and where eq. (8) stands to it."""
     speeds = [find_limit_cycle(flat_active_walker(0.02, tilt)).speed for tilt in (0.2, 0.4, 0.7)]
     same = float(np.ptp(speeds)) < 1e-9
-    usual, gentle = (overestimate(slope, 0.5) for slope in (0.01, numbers.PASSIVE_SLOPE))
+    usual, gentle = (overestimate(slope, 0.5) for slope in (0.01, PASSIVE_SLOPE))
     others = [
         overestimate(slope, radius) for slope in (0.01, 0.04) for radius in (0.0, 0.3, 0.5, 0.7)
     ]
     over, slight = min(others) > 0.0, max(usual, gentle) < _SLIGHT
     return (
         judge(
-            numbers.TILT_INDEPENDENT,
+            statement("velocity and tilt"),
             same,
             ours=f"{speeds[0]:.6f} at α = 0.2, 0.4, 0.7",
-            remark="" if same else "The speed changes with the tilt.",
+            unless="The speed changes with the tilt.",
         ),
         judge(
-            numbers.EQUATION_8,
+            statement("eq. (8), sign"),
             over,
             ours=f"by {min(others):.1%} to {max(others):.1%}",
             remark=f"With larger feet the sign changes: {overestimate(0.01, 0.8):+.2%} at r = 0.8, "
@@ -173,12 +168,10 @@ def tilt_checks() -> tuple[Check, ...]:
             else "It is no overestimate.",
         ),
         judge(
-            numbers.EQUATION_8_SLIGHTLY,
+            statement("eq. (8), size"),
             slight,
             ours=f"{usual:.1%} at γ = 0.01, {gentle:.0%} at γ = 0.00058",
-            remark=""
-            if slight
-            else "Slight where the walk is fast. What it neglects, the slowing down at mid-stance, weighs "
+            unless="Slight where the walk is fast. What it neglects, the slowing down at mid-stance, weighs "
             "more the slower the walk.",
         ),
     )
