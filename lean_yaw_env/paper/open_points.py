@@ -34,18 +34,18 @@ def _table(headings: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> Column
     return dict(zip(headings, zip(*rows, strict=True), strict=True))
 
 
-def lateral_pair(walker: PassiveWalker) -> Vector:
+def lateral_pair(walker: PassiveWalker) -> np.ndarray:
     """The two greatest lateral multipliers of a flat passive walker's stride, by falling magnitude."""
     matrix = passive_gait(walker).jacobian[np.ix_(LATERAL, LATERAL)]
     return _pair(matrix)
 
 
-def _pair(matrix: Vector) -> Vector:
+def _pair(matrix: Vector) -> np.ndarray:
     values = np.linalg.eigvals(matrix)
     return values[np.argsort(-np.abs(values))][:2]
 
 
-def forward_difference_pair(width: float) -> Vector:
+def forward_difference_pair(width: float) -> np.ndarray:
     """The pair as the paper found it: one simulation for each deviation of an initial condition."""
     stride, state = PassiveMap(flat_passive_walker(), 2), passive_gait(flat_passive_walker()).state
     columns = [
@@ -55,7 +55,7 @@ def forward_difference_pair(width: float) -> Vector:
     return _pair(np.array(columns).T)
 
 
-def nearest_pair(points: int = 21) -> tuple[float, Vector]:
+def nearest_pair(points: int = 21) -> tuple[float, np.ndarray]:
     """The pair nearest the paper's over all tilts and slopes that round to its own, and how near."""
     slopes = PASSIVE_SLOPE + np.linspace(-5e-6, 5e-6, 5)
     pairs = []
@@ -74,7 +74,7 @@ def lateral_pair_section() -> Section:
     paper = np.array([printed.value for printed in numbers_of("C: λ")[3:5]])
     ours = lateral_pair(flat_passive_walker())
     usual = flat_passive_walker().parameters
-    tried: list[tuple[str, Vector]] = [("the paper", paper), ("ours", ours)]
+    tried: list[tuple[str, np.ndarray]] = [("the paper", paper), ("ours", ours)]
     for name, values in (
         ("ankle_tilt", (0.1499, 0.1501)),
         ("slope", (0.000575, 0.000585)),
@@ -160,7 +160,7 @@ _ROUNDED = {
 
 
 def _heading(name: str, value: float) -> float:
-    return float(find_limit_cycle(Walker(WalkerParameters(**{name: value}))).state[0])
+    return float(find_limit_cycle(Walker(replace(WalkerParameters(), **{name: value}))).state[0])
 
 
 def finite_mass_heading(foot_mass: float = _FOOT_MASS) -> float:
@@ -174,7 +174,8 @@ def finite_mass_heading(foot_mass: float = _FOOT_MASS) -> float:
     def excess(change: Vector) -> Vector:
         return MIRROR * walker.step(gait + change).state[:5] - gait - change
 
-    return float((gait + fsolve(excess, np.zeros(5), epsfcn=1e-10))[0])
+    change = np.asarray(fsolve(excess, np.zeros(5), epsfcn=1e-10))
+    return float((gait + change)[0])
 
 
 def heading_section() -> Section:

@@ -7,11 +7,12 @@ import math
 import numpy as np
 from scipy.optimize import brentq
 
-from lean_yaw_env.analysis import PassiveMap, find_limit_cycle, find_passive_gaits, planar_gait_rate
+from lean_yaw_env.analysis import PassiveMap, find_limit_cycle, planar_gait_rate
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.paper.checks import Check, judge
 from lean_yaw_env.paper.numbers import statement
 from lean_yaw_env.paper.results import Result
+from lean_yaw_env.paper.walkers import passive_gait
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.passive import FORE_AFT, PassiveWalker
 from lean_yaw_env.walker import Walker
@@ -139,7 +140,7 @@ def _lateral_check() -> Check:
     body = WalkerParameters(
         hip_width=0.0, ankle_tilt=0.5 * math.pi, foot_radius=0.3, slope=_WALKING_SLOPE
     )
-    planar = find_passive_gaits(PassiveWalker(body, planar=True))[0]
+    planar = passive_gait(PassiveWalker(body, planar=True))
     section_map = PassiveMap(PassiveWalker(body))
     matrix = section_map.derivative(planar.state)[1]
     values = np.linalg.eigvals(matrix)

@@ -31,11 +31,11 @@ _END_STEPS = 1000
 @lru_cache(maxsize=16)
 def gaits(slope: float = GARCIA_SLOPE) -> tuple[LimitCycle, LimitCycle]:
     """The long and the short gait."""
-    long, short = find_passive_gaits(point_foot_walker(slope))
+    *_, long, short = find_passive_gaits(point_foot_walker(slope))
     return long, short
 
 
-def step_multipliers(gait: LimitCycle, slope: float = GARCIA_SLOPE) -> Vector:
+def step_multipliers(gait: LimitCycle, slope: float = GARCIA_SLOPE) -> np.ndarray:
     """Multipliers of one step, the greatest first."""
     section_map = PassiveMap(point_foot_walker(slope))
     matrix = section_map.derivative(gait.state)[1][np.ix_(section_map.free, section_map.free)]

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from lean_yaw_env.analysis import continue_gait
-from lean_yaw_env.paper.walkers import FlatGait, flat_passive_walker
+from lean_yaw_env.paper.walkers import FlatGait, flat_passive_walker, passive_gait
 from lean_yaw_env.passive import PassiveWalker
 
 _SEARCH = (0.03, 0.045)
@@ -19,7 +19,7 @@ _SEARCH = (0.03, 0.045)
 @lru_cache(maxsize=16)
 def doubling_slope(walker: PassiveWalker, limits: tuple[float, float]) -> float:
     """The slope at which the planar gait's period doubles, so that it stops being stable; or nan."""
-    branch = continue_gait(walker, "slope", limits)
+    branch = continue_gait(walker, "slope", limits, state=passive_gait(walker).state)
     leaving = [event.value for event in branch.events if event.is_leaving]
     return leaving[0] if leaving else float("nan")
 

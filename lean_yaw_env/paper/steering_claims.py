@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -106,7 +107,7 @@ def asymmetric_turn(
     """
     usual = circling_walker()
     changed = {} if parameter is None else {parameter: value}
-    other = Walker(WalkerParameters(slope_turns=True, **changed))
+    other = Walker(replace(usual.parameters, **changed))
     state, turn = table_1_gait().state, 0.0
     for _ in range(n_strides):
         first = other.step(state, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)

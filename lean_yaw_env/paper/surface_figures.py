@@ -199,7 +199,7 @@ def figure_9() -> Result:
 def _passive_checks(rows: tuple[WideHipRow, ...]) -> tuple[Check, ...]:
     width, tilt = widest_stable_hip()
     inside = [row for row in rows if row.hip_width <= number("hip width limit, D").value]
-    narrow = [float(np.subtract(*row.stable_tilts[::-1])) for row in inside]
+    narrow = [row.stable_tilts[1] - row.stable_tilts[0] for row in inside]
     least = int(np.argmin(narrow))
     contraction = [row.contraction for row in rows if row.hip_width <= width]
     wide = [row for row in rows if row.hip_width > width]

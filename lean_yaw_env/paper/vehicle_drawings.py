@@ -45,7 +45,7 @@ def _measure(axes: Axes, start: tuple[float, float], end: tuple[float, float], n
     style = {"arrowstyle": "<->", "color": FAINT, "linewidth": 0.8}
     axes.annotate("", end, xytext=start, arrowprops=style)
     middle = 0.5 * (np.array(start) + end)
-    axes.annotate(name, middle, xytext=(4, 4), textcoords="offset points", fontsize=10)
+    axes.annotate(name, tuple(middle), xytext=(4, 4), textcoords="offset points", fontsize=10)
 
 
 def _draw_side(axes: Axes, board: Skateboard) -> None:
@@ -142,7 +142,7 @@ def draw_bicycle() -> Any:
     _measure(axes, (0.0, -0.14), (p.wheelbase, -0.14), "wheelbase")
     _measure(axes, (p.wheelbase, -0.05), (foot[0], -0.05), "")
     axes.annotate("trail", (foot[0] + 0.04, -0.07), fontsize=10)
-    axes.annotate("steer δ, about this axis", foot + 1.2 * upward, fontsize=10)
+    axes.annotate("steer δ, about this axis", tuple(foot + 1.2 * upward), fontsize=10)
     axes.annotate("lean φ, about x", (-0.62, 0.06), fontsize=10)
     axes.annotate("$θ_r$", (0.04, p.rear_wheel.radius + 0.05), fontsize=10)
     arrow = {"arrowstyle": "->", "linewidth": 1.0}
