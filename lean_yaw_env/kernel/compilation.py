@@ -9,6 +9,7 @@ Both keep IEEE semantics (no fast-math), so that every kernel that inlines the s
 from __future__ import annotations
 
 import hashlib
+import linecache
 import sys
 import warnings
 from collections.abc import Callable
@@ -74,6 +75,24 @@ def _borrowed(array):
 _PACKAGE = __name__.split(".", 1)[0]
 
 
+def generated(source: str, **names: Any) -> FunctionType:
+    """The one function that a source text defines, for the decorators above; ``names`` are what the text refers to.
+
+    The text is kept where a traceback, ``fusing`` and the digest of an entry point look for it.
+    """
+    place = f"<generated {hashlib.sha256(source.encode()).hexdigest()[:12]}>"
+    linecache.cache[place] = (len(source), None, source.splitlines(keepends=True), place)
+    scope: dict[str, Any] = {"__name__": __name__, **names}
+    exec(compile(source, place, "exec"), scope)
+    (function,) = (value for name, value in scope.items() if name not in ("__builtins__", "__name__", *names))
+    return function
+
+
+def _text(path: str) -> bytes:
+    """The source of a file, or of a generated function in its place."""
+    return "".join(linecache.getlines(path)).encode() if path.startswith("<") else Path(path).read_bytes()
+
+
 def _ingredients(function: Callable[..., Any]) -> tuple[set[str], set[str]]:
     """What a function is compiled from: files (its own, and those of the package's formulas and records that it names) and constants."""
     files: set[str] = {__file__, str(fusing.__file__)}
@@ -109,7 +128,7 @@ def _digest(function: Callable[..., Any]) -> str:
     files, constants = _ingredients(function)
     digest = hashlib.sha256("\n".join(sorted(constants)).encode())
     for path in sorted(files):
-        digest.update(Path(path).read_bytes())
+        digest.update(_text(path))
     return digest.hexdigest()
 
 

@@ -18,6 +18,7 @@ from lean_yaw_env.kernel.flight import (
     time_to_touch,
 )
 from lean_yaw_env.kernel.heel_strike import impact, landing_place, landing_pose
+from lean_yaw_env.kernel.lanes import row_reader, row_writer
 from lean_yaw_env.kernel.records import (
     BACKWARD,
     FAILED,
@@ -270,19 +271,9 @@ def walking_step(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, s
     return finish(stance, heading, flight)
 
 
-@inlined
-def body_of(row):
-    """A walker's constants from a row of numbers."""
-    return Body(
-        row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9], row[10]
-    )
-
-
-@inlined
-def write_outcome(outcome, row):
-    """Write an outcome's fields to a row of numbers, in order."""
-    for k, value in enumerate(outcome):
-        row[k] = value
+body_of = row_reader(Body)
+command_of = row_reader(Command)
+write_outcome = row_writer(Outcome)
 
 
 @entry_point()
@@ -293,7 +284,7 @@ def step(body, command, state, side, outcome):
     """
     result = walking_step(
         body_of(body),
-        Command(command[0], command[1], command[2]),
+        command_of(command),
         state[0],
         state[1],
         state[2],
