@@ -145,7 +145,10 @@ ZERO_TILT = np.where(np.arange(11) == 2, 0.0, 1.0)
         ({"threads": 0}, "threads must be from 1 to 1024, got 0"),
         ({"threads": 1.7}, "threads must be a whole number from 1 to 1024, got 1.7"),
         # what ``Walker.step`` refuses too
-        ({"states": np.add(GOOD, [0, 0, 0, 1e300, 0])}, r"states\[0\]: stance_pitch_rate must be in"),
+        (
+            {"states": np.add(GOOD, [0, 0, 0, 1e300, 0])},
+            r"states\[0\]: stance_pitch_rate must be in",
+        ),
         ({"states": GOOD.astype(complex)}, "states must hold numbers"),
         ({"states": [[0.0], [0.0, 1.0]]}, "states must hold numbers"),
         ({"inter_leg_angles": 0.0}, r"inter_leg_angles\[0\] must be in \(0, 1.5708\), got 0.0"),

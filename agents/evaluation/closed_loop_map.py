@@ -22,7 +22,7 @@ from lean_yaw_env.envs.rows import WalkerRows
 from lean_yaw_env.envs.tasks import heading, speedheading, task_named, waypoint
 from lean_yaw_env.envs.transition import OFFSET_SCALE, STATE_SCALES
 from lean_yaw_env.errors import FellError
-from lean_yaw_env.kernel.jacobian import INPUTS, OUTPUTS, step_jacobian
+from lean_yaw_env.kernel.jacobian import OUTPUTS, step_jacobian
 from lean_yaw_env.kernel.records import STEPPED, Command
 from lean_yaw_env.parameters import STATE_FIELDS, STATE_SIZE, Foot, Vector
 from lean_yaw_env.walker import SIDE, Walker
@@ -244,18 +244,9 @@ class ClosedLoop:
         """A walking step's outputs, and their exact derivatives (outputs, k + 2) by the state and the two commands."""
         body = self.walker.parameters.body()
         given = Command(float(command[0]), float(command[1]), float(state[OFFSET]))
-        after, rows = np.empty(STATE_SIZE), np.empty((len(OUTPUTS), INPUTS))
-        section = state[:STATE_SIZE].tolist()
-        status = step_jacobian(body, given, *section, SIDE[foot], after, rows)
+        status, outputs, rows = step_jacobian(body, given, state[:STATE_SIZE], SIDE[foot], inputs=8)
         if status != STEPPED:
             raise FellError(f"the walker fell in the step on its {foot} foot")
-        result = self.walker.step(
-            section, stance=foot, inter_leg_angle=given.inter_leg_angle, mass_offset=given.mass_offset,
-            previous_offset=given.previous_offset,
-        )  # fmt: skip
-        outputs = np.zeros(len(OUTPUTS))
-        outputs[:STATE_SIZE] = after
-        outputs[[_DURATION, _X, _Z]] = result.duration, *result.displacement
         wide = np.zeros((len(OUTPUTS), len(state) + 2))
         wide[:, :STATE_SIZE] = rows[:, :STATE_SIZE]
         wide[:, OFFSET] = rows[:, 7]

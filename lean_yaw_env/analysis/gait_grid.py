@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from lean_yaw_env.analysis.fixed_point import RESIDUAL_LIMIT
 from lean_yaw_env.kernel.batch import step_batch
-from lean_yaw_env.kernel.jacobian import INPUTS
-from lean_yaw_env.kernel.jacobians import step_jacobians
+from lean_yaw_env.kernel.jacobian import step_jacobians
 from lean_yaw_env.kernel.records import STEPPED, Body, Outcome
 from lean_yaw_env.parameters import MIRROR, QUARTER_TURN, STATE_SIZE, Vector
 
@@ -173,7 +172,7 @@ def _differentiated(
 ) -> tuple[Vector, Vector, NDArray[np.bool_]]:
     n = grid.n
     statuses, afters = np.empty(n), np.empty((n, STATE_SIZE))
-    rows = np.empty((n, STATE_SIZE, INPUTS))
+    rows = np.empty((n, STATE_SIZE, STATE_SIZE))
     commands, sides = grid.commands(foot), np.full(n, 1.0 - 2.0 * foot)
     bodies, states = np.ascontiguousarray(grid.bodies), np.ascontiguousarray(states)
 
@@ -181,7 +180,7 @@ def _differentiated(
         step_jacobians(bodies, commands, states, sides, statuses, afters, rows, first, last)
 
     _in_parts(part, n, threads)
-    return afters, rows[:, :, :STATE_SIZE].copy(), statuses == STEPPED
+    return afters, rows, statuses == STEPPED
 
 
 def _described(

@@ -15,10 +15,10 @@ import numpy as np
 
 from lean_yaw_env.analysis.stride import differentiate_step, require_offsets
 from lean_yaw_env.errors import FellError, NoGaitError
+from lean_yaw_env.kernel.jacobian import INPUTS, step_jacobian
 from lean_yaw_env.kernel.passive import INPUTS as PASSIVE_INPUTS
 from lean_yaw_env.kernel.passive import passive_jacobian
 from lean_yaw_env.kernel.records import STEPPED, Command
-from lean_yaw_env.kernel.sensitivity import INPUTS, step_sensitivity
 from lean_yaw_env.parameters import (
     INTER_LEG_ANGLE,
     MIRROR,
@@ -214,17 +214,17 @@ class ActiveMap:
     def sensitivity(self, state: Vector, parameter: str) -> tuple[Vector, Vector, Vector]:
         matrix, by_parameter = np.eye(STATE_SIZE), np.zeros(STATE_SIZE)
         foot: Foot = "left"
-        rows, after = np.empty((STATE_SIZE, INPUTS)), np.empty(STATE_SIZE)
         for k in range(self.n_steps):
-            status = step_sensitivity(
-                self.walker.parameters.body(), self._command(k), state, SIDE[foot], after, rows
+            status, outputs, rows = step_jacobian(
+                self.walker.parameters.body(), self._command(k), state, SIDE[foot]
             )
+            after, rows = outputs[:STATE_SIZE], rows[:STATE_SIZE]
             raise_for_failure(status, state, self.walker.parameters)
             if status in FALL_OF_STATUS:
                 raise FellError(f"the walker fell {FALL_OF_STATUS[status].value} in step {k + 1}")
             by_parameter = rows[:, :5] @ by_parameter + rows[:, 5:] @ self._direction(parameter, k)
             matrix = rows[:, :5] @ matrix
-            state, foot = after.copy(), OTHER_FOOT[foot]
+            state, foot = after, OTHER_FOOT[foot]
         state, matrix = self._mirrored(state, matrix)
         return state, matrix, MIRROR * by_parameter if self.n_steps % 2 else by_parameter
 
@@ -261,7 +261,7 @@ class ActiveMap:
     def _direction(self, parameter: str, k: int) -> Vector:
         """How a parameter enters the inputs of step ``k`` after the state."""
         if parameter in BODY_PARAMETERS:
-            return np.eye(INPUTS - 5)[3 + BODY_PARAMETERS.index(parameter)]
+            return np.eye(len(INPUTS) - 5)[3 + BODY_PARAMETERS.index(parameter)]
         sign = 1.0 if k % 2 == 0 else -1.0
         direction = {
             "inter_leg_angle": (1.0, 0.0, 0.0),

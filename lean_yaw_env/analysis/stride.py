@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lean_yaw_env.errors import FellError
-from lean_yaw_env.kernel.jacobian import INPUTS, step_jacobian
+from lean_yaw_env.kernel.jacobian import step_jacobian
 from lean_yaw_env.kernel.records import Command
 from lean_yaw_env.parameters import (
     INTER_LEG_ANGLE,
@@ -93,17 +93,16 @@ def differentiate_step(walker: Walker, state: ArrayLike, stance: Foot, command: 
         If the walker does not complete the step; names the way it fell.
     """
     start = require_state(state)
-    after = np.empty(STATE_SIZE)
-    jacobian = np.empty((STATE_SIZE, INPUTS))
-    status = step_jacobian(
-        walker.parameters.body(), command, *start.tolist(), SIDE[stance], after, jacobian
+    status, outputs, rows = step_jacobian(
+        walker.parameters.body(), command, start, SIDE[stance], inputs=8
     )
     raise_for_failure(status, start, walker.parameters)
     if status in FALL_OF_STATUS:
         raise FellError(
             f"the walker fell {FALL_OF_STATUS[status].value} in the step on its {stance} foot"
         )
-    return Step(after, jacobian[:, :5], jacobian[:, 5], jacobian[:, 6], jacobian[:, 7])
+    by_state, by_command = rows[:STATE_SIZE, :STATE_SIZE], rows[:STATE_SIZE, STATE_SIZE:]
+    return Step(outputs[:STATE_SIZE], by_state, *by_command.T)
 
 
 def stride_map(

@@ -12,7 +12,7 @@ import hashlib
 import linecache
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
@@ -84,13 +84,19 @@ def generated(source: str, **names: Any) -> FunctionType:
     linecache.cache[place] = (len(source), None, source.splitlines(keepends=True), place)
     scope: dict[str, Any] = {"__name__": __name__, **names}
     exec(compile(source, place, "exec"), scope)
-    (function,) = (value for name, value in scope.items() if name not in ("__builtins__", "__name__", *names))
+    (function,) = (
+        value for name, value in scope.items() if name not in ("__builtins__", "__name__", *names)
+    )
     return function
 
 
 def _text(path: str) -> bytes:
     """The source of a file, or of a generated function in its place."""
-    return "".join(linecache.getlines(path)).encode() if path.startswith("<") else Path(path).read_bytes()
+    return (
+        "".join(linecache.getlines(path)).encode()
+        if path.startswith("<")
+        else Path(path).read_bytes()
+    )
 
 
 def _ingredients(function: Callable[..., Any]) -> tuple[set[str], set[str]]:
@@ -103,8 +109,7 @@ def _ingredients(function: Callable[..., Any]) -> tuple[set[str], set[str]]:
         each = waiting.pop()
         seen.add(each)
         files.add(each.__code__.co_filename)
-        for name in each.__code__.co_names:
-            named = each.__globals__.get(name)
+        for name, named in _names(each):
             named = getattr(named, "py_func", named)
             home = named.__name__ if isinstance(named, ModuleType) else _home(named)
             if isinstance(named, (bool, int, float, tuple)):
@@ -116,6 +121,14 @@ def _ingredients(function: Callable[..., Any]) -> tuple[set[str], set[str]]:
             else:
                 files.add(str(sys.modules[home].__file__))
     return files, constants
+
+
+def _names(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
+    """What a function's names stand for, those of the module and those of the functions around it."""
+    code = function.__code__
+    yield from ((name, function.__globals__.get(name)) for name in code.co_names)
+    for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
+        yield name, cell.cell_contents
 
 
 def _home(named: Any) -> str:

@@ -5,7 +5,7 @@ A loop over walkers that LLVM vectorises keeps a row for each quantity and a lan
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from lean_yaw_env.kernel.compilation import generated, inlined
@@ -22,27 +22,28 @@ def padded(n):
     return (n + _VECTOR - 1) // _VECTOR * _VECTOR
 
 
-def rows_of(record: type[Any], carried: Collection[str] = ()) -> int:
-    """How many rows a record takes: one for each field, and one for the derivative of each that is ``carried``."""
-    return len(record._fields) + len(carried)
+def lane_reader(
+    record: type[Any], place: int, carried: Sequence[str] = (), derivatives: int = 0
+) -> Any:
+    """``read(work, i)``: the record in lane ``i`` of the rows from ``place`` on, a row for each field.
 
-
-def lane_reader(record: type[Any], place: int, carried: Sequence[str] = ()) -> Any:
-    """``read(work, i)``: the record in lane ``i`` of the rows from ``place`` on.
-
-    Fields in ``carried`` are complex; the rows of their imaginary parts follow those of all fields, in the order of ``carried``.
+    Fields in ``carried`` are complex; the rows of their imaginary parts, in this order, begin at ``derivatives``.
     """
     values = (
         f"complex(work[{real} + i], work[{imaginary} + i])" if imaginary else f"work[{real} + i]"
-        for _, real, imaginary in _places(record, place, carried)
+        for _, real, imaginary in _places(record, place, carried, derivatives)
     )
-    return _function(f"def read(work, i):\n    return {record.__name__}({', '.join(values)})", record)
+    return _function(
+        f"def read(work, i):\n    return {record.__name__}({', '.join(values)})", record
+    )
 
 
-def lane_writer(record: type[Any], place: int, carried: Sequence[str] = ()) -> Any:
-    """``write(work, i, value)``: put a record into lane ``i`` of the rows from ``place`` on; see ``lane_reader``."""
+def lane_writer(
+    record: type[Any], place: int, carried: Sequence[str] = (), derivatives: int = 0
+) -> Any:
+    """``write(work, i, value)``: put a record where ``lane_reader`` with the same arguments finds it."""
     lines = ["def write(work, i, value):"]
-    for name, real, imaginary in _places(record, place, carried):
+    for name, real, imaginary in _places(record, place, carried, derivatives):
         lines.append(f"    work[{real} + i] = value.{name}.real")
         if imaginary:
             lines.append(f"    work[{imaginary} + i] = value.{name}.imag")
@@ -61,13 +62,13 @@ def row_writer(record: type[Any]) -> Any:
     return _function("\n".join(("def write(value, row):", *lines)), record)
 
 
-def _places(record: type[Any], place: int, carried: Sequence[str]) -> list[tuple[str, int, int]]:
+def _places(
+    record: type[Any], place: int, carried: Sequence[str], derivatives: int
+) -> list[tuple[str, int, int]]:
     """Each field's name, where its row begins, and where that of its imaginary part does, 0 for none."""
-    fields = record._fields
-    behind = place + len(fields) * ROW
     return [
-        (name, place + k * ROW, behind + carried.index(name) * ROW if name in carried else 0)
-        for k, name in enumerate(fields)
+        (name, place + k * ROW, derivatives + carried.index(name) * ROW if name in carried else 0)
+        for k, name in enumerate(record._fields)
     ]
 
 

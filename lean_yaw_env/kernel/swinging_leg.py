@@ -31,7 +31,7 @@ def with_inter_leg_angle(c, inter_leg):
         c.radius, c.tilt, c.sin_tilt, c.cos_tilt, c.half_axle, c.axle_inertia,
         c.gravity_x, c.gravity_y, c.gravity_z, sine, cosine,
         c.ankle_stiffness, c.ankle_damping, c.previous_offset, c.offset_change, c.shift_rate,
-        c.friction_limit_squared, c.max_duration,
+        c.friction_limit_squared, c.max_duration, c.heading,
     )  # fmt: skip
 
 
@@ -90,7 +90,13 @@ def swinging_accelerations_in(c, pose, w, v, u):
         c, stance.sin_twist, stance.cos_twist, pose.q, pose.dq, w, v, still, still
     )
     # the hip's acceleration less gravity, along e1, a and e3
-    f1 = b1 - pose.lever_u * dw + pose.dq * dv - c.gravity_x * stance.cos_a - c.gravity_y * stance.sin_a
+    f1 = (
+        b1
+        - pose.lever_u * dw
+        + pose.dq * dv
+        - c.gravity_x * stance.cos_a
+        - c.gravity_y * stance.sin_a
+    )
     fa = ba - pose.lever_w * dw - c.gravity_x * stance.sin_a + c.gravity_y * stance.cos_a
     f3 = b3 - pose.q * dv - c.gravity_z
     turning = w * stance.sin_twist
@@ -101,7 +107,14 @@ def swinging_accelerations_in(c, pose, w, v, u):
         - stance.cos_twist * dw
         - about_tangent * about_radius
         - along_tangent(
-            c, pose.sin_inter_leg, pose.cos_inter_leg, stance.sin_twist, stance.cos_twist, f1, fa, f3
+            c,
+            pose.sin_inter_leg,
+            pose.cos_inter_leg,
+            stance.sin_twist,
+            stance.cos_twist,
+            f1,
+            fa,
+            f3,
         )
     )
     return dw, dv, du

@@ -186,7 +186,7 @@ def stepper(
             seen = f"seen_{stage} = look(c, pose_{stage}, {each('v{i}_{s}', s=stage)})"
             taken = (f"a{i}_{stage} = seen_{stage}[{i - 1}]" for i in range(1, coordinates + 1))
             return "; ".join((seen, *taken))
-        return f"{each('a{i}_{s}', s=stage)} = accelerations(c, pose_{stage}, {each('v{i}_{s}', s=stage)})"
+        return f"{each('a{i}_{s}', s=stage)}, = accelerations(c, pose_{stage}, {each('v{i}_{s}', s=stage)})"
 
     numbers = range(1, coordinates + 1)
     lines = [f"def step(c, t, {each('x{i}')}, {each('v{i}_1')}, {each('a{i}_1')}, h):"]
@@ -199,7 +199,9 @@ def stepper(
         lines += [f"v{i}_{stage} = v{i}_1 + h * ({_sum(weights, f'a{i}')})" for i in numbers]
     lines.append(equations_of_motion(STAGES))
     errors = [f"abs((h * ({_sum(ERROR_WEIGHTS, f'{k}{i}')})).real)" for k in "va" for i in numbers]
-    pairs = [f"max({first}, {second})" for first, second in zip(errors[::2], errors[1::2], strict=True)]
+    pairs = [
+        f"max({first}, {second})" for first, second in zip(errors[::2], errors[1::2], strict=True)
+    ]
     lines.append(f"error = {reduce('max({}, {})'.format, pairs)}")
     ends = [f"x{i} + h * ({_sum(WEIGHTS, f'v{i}')})" for i in numbers]
     ends += [f"v{i}_1 + h * ({_sum(WEIGHTS, f'a{i}')})" for i in numbers]

@@ -22,9 +22,8 @@ from lean_yaw_env.envs.transition import (
     STATE_CENTRES,
     STATE_SCALES,
 )
-from lean_yaw_env.kernel.jacobian import INPUTS, OUTPUTS
-from lean_yaw_env.kernel.jacobians import step_jacobians
-from lean_yaw_env.kernel.records import Outcome
+from lean_yaw_env.kernel.jacobian import OUTPUTS, step_jacobians
+from lean_yaw_env.kernel.records import Command, Outcome
 from lean_yaw_env.parameters import STATE_SIZE
 from lean_yaw_env.threads import share_out
 
@@ -87,7 +86,7 @@ class DifferentiableWalkers:
         # the last numbers of an ended episode are still needed
         self.env.autoreset_mode = AutoresetMode.DISABLED
         self._settings = self.env.rows.settings.tolist()
-        self._jacobians = np.zeros((n, len(OUTPUTS), INPUTS))
+        self._jacobians = np.zeros((n, len(OUTPUTS), STATE_SIZE + len(Command._fields)))
         self._scratch = (np.zeros(n), np.zeros((n, STATE_SIZE)))
         self._returns, self._lengths = np.zeros(n), np.zeros(n, dtype=np.int64)
 
