@@ -1,14 +1,15 @@
-"""Agents for the walking environments: the paper's controller, feedback, and trained policies; needs ``lean-yaw-env[train]``.
+"""Agents for the walking environments: controllers, predictive control, and trained policies.
 
-``load("LeanYaw/Heading-v0")`` gives a trained policy that comes with the package, ``load(folder)`` one of your own.
+``load("LeanYaw/Heading-v0")`` gives a trained policy that comes with the package, ``load(folder)`` one of your own; policies need
+``lean-yaw-env[agents]``, training ``lean-yaw-env[train]``, the controllers nothing more than the walker itself. In a checkout the package is
+``agents``, in an installation ``lean_yaw_env.agents``.
 """
 
-from agents.agent import Agent
-from agents.controllers.heading_feedback import HeadingFeedback, HeadingGains
-from agents.controllers.simple import FixedController, RandomController
-from agents.policies.policy import Policy, PolicyCard
-from agents.policies.storage import PolicyFileError, load, save, shipped_seeds
-from agents.registry import AGENTS, AgentRequest, make_agent
+from .agent import Agent
+from .controllers.simple import FixedController, HeadingFeedback, HeadingGains, RandomController
+from .policies.policy import Policy, PolicyCard
+from .policies.storage import PolicyFileError, load, save, shipped_seeds
+from .registry import AGENTS, AgentRequest, make_agent
 
 __all__ = [
     "AGENTS",

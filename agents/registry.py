@@ -7,13 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from agents.agent import Agent
-from agents.controllers.guidance import guided
-from agents.controllers.heading_feedback import HeadingFeedback
-from agents.controllers.mpc import MpcController
-from agents.controllers.simple import FixedController, RandomController
-from agents.files import read_json
-from agents.policies.storage import (
+from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.errors import NoGaitError
+from lean_yaw_env.files import read_json
+from lean_yaw_env.registration import ENV_IDS, GOAL_ENV_ID, TASK_VERSIONS
+from lean_yaw_env.rendering.palette import AGENT_COLOURS, INK, unit_colour
+from lean_yaw_env.validation import require_choice
+
+from .agent import Agent
+from .controllers.guidance import guided
+from .controllers.mpc import MpcController
+from .controllers.simple import FixedController, HeadingFeedback, RandomController
+from .policies.storage import (
     CARD_FILE,
     DEFAULT_ALGORITHM,
     load,
@@ -21,9 +26,6 @@ from agents.policies.storage import (
     shipped_seeds,
     task_of,
 )
-from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.errors import NoGaitError
-from lean_yaw_env.registration import ENV_IDS, TASK_VERSIONS
 
 Kind = Literal["baseline", "feedback", "planner", "learned"]
 """What an agent rests on: nothing, a law from its observation, a search on the walker itself at every step, or a training."""
@@ -102,9 +104,12 @@ AGENTS: dict[str, AgentEntry] = {
 
 def agent_entry(name: str) -> AgentEntry:
     """The entry of that name, or ``ValueError`` naming those there are."""
-    if name not in AGENTS:
-        raise ValueError(f"agents must be among {', '.join(AGENTS)}, not {name!r}")
-    return AGENTS[name]
+    return AGENTS[require_choice("agent", name, AGENTS)]
+
+
+def agent_colour(name: str) -> tuple[float, float, float]:
+    """An agent's colour in parts of one, the same in every picture; that of ink for one that has none."""
+    return unit_colour(AGENT_COLOURS.get(name, INK))
 
 
 def make_agent(name: str, request: AgentRequest) -> Agent:
@@ -122,7 +127,7 @@ def make_agent(name: str, request: AgentRequest) -> Agent:
     entry = agent_entry(name)
     task = task_of(request.env_id)
     if task not in entry.tasks:
-        raise ValueError(f"{name} is an agent for {', '.join(entry.tasks)}, not for {task!r}")
+        raise ValueError(f"{name} is an agent for {', '.join(entry.tasks)}, got {task!r}")
     return entry.make(request)
 
 
@@ -165,11 +170,13 @@ def policy_folders(algorithm: str, request: AgentRequest) -> list[Path]:
 
 def env_id_of(task: str) -> str:
     """The environment's id for a task's name, or ``ValueError``."""
-    for env_id in ENV_IDS:
-        if task_of(env_id) == task:
-            return env_id
-    names = ", ".join(task_of(env_id) for env_id in ENV_IDS)
-    raise ValueError(f"task must be one of {names}, not {task!r}")
+    if task == task_of(GOAL_ENV_ID):
+        raise ValueError(
+            f"task must be one whose observations are arrays, got {task!r}: its observations are dictionaries for goal-conditioned learners, "
+            f"as Stable-Baselines3's SAC with HerReplayBuffer on gym.make({GOAL_ENV_ID!r}); Waypoint is the same task for agents of this package"
+        )
+    require_choice("task", task, TASK_VERSIONS)
+    return next(env_id for env_id in ENV_IDS if task_of(env_id) == task)
 
 
 def newest_policy(env_id: str, runs: Path, algorithm: str = DEFAULT_ALGORITHM) -> Path | None:

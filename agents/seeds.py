@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from lean_yaw_env.parameters import require_number
+from lean_yaw_env.validation import require_count
 
 MOST_WALKERS = 2**12
 """Walkers of one training at most."""
@@ -24,10 +24,10 @@ MOST_EVALUATIONS = 2**31
 
 def training_seed(seed: int) -> int:
     """The environment seed of the first walker of a training, or ``ValueError``."""
-    return MOST_WALKERS * int(require_number("seed", seed, 0, TRAINING_SEEDS - 1))
+    return MOST_WALKERS * require_count("seed", seed, 0, TRAINING_SEEDS - 1)
 
 
 def evaluation_seed(seed: int) -> int:
     """The environment seed of the first episode of an evaluation, or ``ValueError``."""
-    number = int(require_number("seed", seed, 0, MOST_EVALUATIONS - 1))
+    number = require_count("seed", seed, 0, MOST_EVALUATIONS - 1)
     return EVALUATION_SEEDS + MOST_EPISODES * number

@@ -1,4 +1,4 @@
-"""How fast the package is, beside the bars it is held to and beside what its users compare it with.
+"""How fast the package is, beside its targets and beside what its users compare it with.
 
     python -m benchmarks                the full run: every benchmark, kept in benchmarks/results
     python -m benchmarks.kernel         the step itself: single calls, batches, derivatives, against scipy

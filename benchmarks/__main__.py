@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 from dataclasses import asdict
 from pathlib import Path
 
 from benchmarks import environments, kernel, startup, training
-from benchmarks.bars import as_json, as_text
 from benchmarks.compare import as_text as comparison_text
-from benchmarks.compare import compare
+from benchmarks.compare import compare, save_plot
 from benchmarks.machine import machine
-from benchmarks.plot import save_plot
+from benchmarks.measurements import as_json, as_text
 from lean_yaw_env.files import write_text
 
 RESULTS = Path(__file__).parent / "results"
@@ -19,14 +19,15 @@ RESULTS = Path(__file__).parent / "results"
 
 def main() -> None:
     """Measure all, print it, and keep it."""
-    figures = []
+    argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__).parse_args()
+    measurements = []
     for benchmark in (kernel, environments, startup, training):
         measured = benchmark.run(smallest=False)
         print(as_text(measured), end="\n\n", flush=True)
-        figures += measured
+        measurements += measured
     speeds = compare(smallest=False)
     print(comparison_text(speeds))
-    kept = as_json(figures) | {"comparison": [asdict(speed) for speed in speeds]}
+    kept = as_json(measurements) | {"comparison": [asdict(speed) for speed in speeds]}
     RESULTS.mkdir(exist_ok=True)
     write_text(RESULTS / "full.json", json.dumps(kept, indent=2) + "\n")
     save_plot(speeds, machine(), RESULTS / "comparison.png")

@@ -11,9 +11,10 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 
@@ -21,10 +22,12 @@ from benchmarks.environments import HEADING, single_steps, vector_steps, walkers
 from benchmarks.kernel import all_steps, single_step, two_cores
 from benchmarks.machine import machine
 from benchmarks.measure import FULL, SMALLEST, Effort, measure
-from benchmarks.plot import save_plot
 from benchmarks.populations import perturbed_gait
 from benchmarks.scipy_step import ScipyStep
+from lean_yaw_env.rendering.figures import new_figure, save_figure
+from lean_yaw_env.rendering.palette import BLUE, LIGHT_GREY, unit_colour
 
+OWN, OTHER = unit_colour(BLUE), unit_colour(LIGHT_GREY)
 VECTOR = 1024
 BATCH = 4096
 EULER = "one Euler step of 0.02 s; no contact, no error control"
@@ -32,7 +35,7 @@ EULER = "one Euler step of 0.02 s; no contact, no error control"
 
 @dataclass(frozen=True)
 class Case:
-    """One bar of the figure: ``steps`` steps in a call of ``play``."""
+    """One line of the comparison: ``steps`` steps in a call of ``play``."""
 
     name: str
     play: Callable[[], object]
@@ -148,12 +151,48 @@ def as_text(speeds: list[Speed]) -> str:
     return "\n".join(lines)
 
 
+def save_plot(speeds: list[Speed], machine: Mapping[str, Any], path: Path) -> None:
+    """Draw steps per second on a logarithmic axis, fastest on top, and write the picture whole."""
+    figure = new_figure(9.0, 0.36 * len(speeds) + 1.5)
+    axes = figure.add_subplot()
+    places = range(len(speeds))
+    rates = [speed.steps_per_second for speed in speeds]
+    axes.barh(places, rates, color=[OWN if speed.ours else OTHER for speed in speeds])
+    for place, speed in zip(places, rates, strict=True):
+        axes.text(speed * 1.1, place, _short(speed), va="center", fontsize=9)
+    axes.set_yticks(places, [speed.name for speed in speeds])
+    for label, speed in zip(axes.get_yticklabels(), speeds, strict=True):
+        label.set_color(OWN if speed.ours else "black")
+    axes.invert_yaxis()
+    axes.set_xscale("log")
+    axes.set_xlim(min(rates) * 0.6, max(rates) * 6.0)
+    axes.set_xlabel("steps per second; this package (blue): whole walking steps")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.set_title(_caption(machine), fontsize=9, loc="left", color="dimgray")
+    save_figure(figure, path, dpi=160)
+
+
+def _caption(machine: Mapping[str, Any]) -> str:
+    units = machine["vector_instructions"].upper().replace("AVX512F", "AVX-512")
+    return (
+        f"{machine['processor']} ({machine['architecture']}, {units}, {machine['cores']} cores), one thread "
+        f"unless said, Python {machine['python']}"
+    )
+
+
+def _short(speed: float) -> str:
+    for unit, size in (("M", 1e6), ("k", 1e3)):
+        if speed >= size:
+            return f"{speed / size:.3g} {unit}"
+    return f"{speed:.3g}"
+
+
 def main() -> None:
     """Run as a program."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--smallest", action="store_true", help="only to see that it runs")
-    parser.add_argument("--plot", type=Path, help="PNG file for the figure")
+    parser.add_argument("--plot", type=Path, help="PNG file for the picture")
     arguments = parser.parse_args()
     speeds = compare(arguments.smallest)
     if arguments.plot:

@@ -13,8 +13,9 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector import VectorEnv
 
-from benchmarks.bars import Figure, command_line
 from benchmarks.measure import FULL, SMALLEST, Effort, Timings, measure
+from benchmarks.measurements import Measurement, command_line
+from lean_yaw_env.envs.dynamics import OUTCOME_SIZE
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.kernel.batch import step_batch
 
@@ -70,12 +71,17 @@ def walkers(n: int, **options: Any) -> WalkerVectorEnv:
 
 def kernel_alone(env: WalkerVectorEnv) -> Callable[[], None]:
     """The batch kernel on the very walkers that the environment has stepped last."""
-    rows = env.rows
-    outcomes = np.empty_like(rows.outcomes)
-    return lambda: step_batch(rows.bodies, *rows.kernel_rows, outcomes, 0, rows.n)
+    simulation = env.simulation
+    walkers, n = simulation.walkers, simulation.n
+    commands = np.column_stack(
+        [walkers[name] for name in ("inter_leg_angle", "commanded_offset", "mass_offset")]
+    )
+    states, sides = simulation.states.copy(), walkers["side"].copy()
+    outcomes = np.empty((n, OUTCOME_SIZE))
+    return lambda: step_batch(simulation.bodies, commands, states, sides, outcomes, 0, n)
 
 
-def _single(effort: Effort, steps: int) -> list[Figure]:
+def _single(effort: Effort, steps: int) -> list[Measurement]:
     times = measure(
         {
             "heading": single_steps(HEADING, steps, "fixed"),
@@ -86,8 +92,8 @@ def _single(effort: Effort, steps: int) -> list[Figure]:
         effort,
         "single environments",
     )
-    figures = [
-        Figure(f"step_{case}", times.median(case) / steps * 1e6, "us", note=note)
+    measured = [
+        Measurement(f"step_{case}", times.median(case) / steps * 1e6, "us", note=note)
         for case, note in (
             ("heading", "fixed controller"), ("random", "random actions"),
             ("pendulum", "Pendulum-v1"), ("cartpole", "CartPole-v1"),
@@ -95,26 +101,26 @@ def _single(effort: Effort, steps: int) -> list[Figure]:
     ]  # fmt: skip
     over_pendulum = times.ratio("heading", "pendulum")
     return [
-        *figures,
-        Figure("step_over_pendulum", over_pendulum, "x", "<=", 1.0, "unwrapped"),
-        Figure("random_step_over_pendulum", times.ratio("random", "pendulum"), "x"),
-        Figure("step_over_cartpole", times.ratio("heading", "cartpole"), "x", note="aim: 1"),
+        *measured,
+        Measurement("step_over_pendulum", over_pendulum, "x", "<=", 1.0, "unwrapped"),
+        Measurement("random_step_over_pendulum", times.ratio("random", "pendulum"), "x"),
+        Measurement("step_over_cartpole", times.ratio("heading", "cartpole"), "x", note="aim: 1"),
     ]
 
 
-def _vector(effort: Effort, n: int, actions: str) -> list[Figure]:
+def _vector(effort: Effort, n: int, actions: str) -> list[Measurement]:
     """One size of vector environment against the kernel on the same walkers."""
     env = walkers(n)
     play = vector_steps(env, actions)
     times = measure({"env": play, "kernel": kernel_alone(env)}, effort, f"{n} walkers")
     name = f"vector_{n}_{actions}"
     return [
-        Figure(f"{name}_steps_per_second", n / times.median("env"), "1/s"),
-        Figure(f"{name}_over_kernel", times.ratio("env", "kernel"), "x", "<=", 2.0),
+        Measurement(f"{name}_steps_per_second", n / times.median("env"), "1/s"),
+        Measurement(f"{name}_over_kernel", times.ratio("env", "kernel"), "x", "<=", 2.0),
     ]
 
 
-def _against_cartpole(effort: Effort, n: int) -> list[Figure]:
+def _against_cartpole(effort: Effort, n: int) -> list[Measurement]:
     cases: dict[str, Callable[[], object]] = {
         actions: vector_steps(walkers(n), actions) for actions in ("fixed", "random")
     }
@@ -123,11 +129,11 @@ def _against_cartpole(effort: Effort, n: int) -> list[Figure]:
     )
     times = measure(cases, effort, "SyncVectorEnv")
     return [
-        Figure("sync_cartpole_steps_per_second", n / times.median("sync"), "1/s"),
-        Figure(
+        Measurement("sync_cartpole_steps_per_second", n / times.median("sync"), "1/s"),
+        Measurement(
             "vector_over_sync_cartpole", times.ratio("sync", "fixed"), "x", ">=", 20.0, "fixed controller"
         ),
-        Figure(
+        Measurement(
             "random_vector_over_sync_cartpole", times.ratio("sync", "random"), "x", ">=", 20.0,
             "random actions",
         ),
@@ -143,18 +149,18 @@ def _two_threads(effort: Effort, n: int) -> Timings:
     )
 
 
-def run(smallest: bool) -> list[Figure]:
-    """All figures of the environments."""
+def run(smallest: bool) -> list[Measurement]:
+    """All measurements of the environments."""
     effort, sizes, steps = (SMALLEST, SMALLEST_SIZES, 5) if smallest else (FULL, SIZES, STEPS)
-    figures = _single(effort, steps)
+    measured = _single(effort, steps)
     for n in sizes:
         for actions in ("fixed", "random"):
-            figures += _vector(effort, n, actions)
-    figures += _against_cartpole(effort, 8 if smallest else CARTPOLES)
+            measured += _vector(effort, n, actions)
+    measured += _against_cartpole(effort, 8 if smallest else CARTPOLES)
     threads = _two_threads(effort, sizes[-1])
     return [
-        *figures,
-        Figure("vector_two_threads_over_one", threads.ratio("1", "2"), "x", ">=", 1.8),
+        *measured,
+        Measurement("vector_two_threads_over_one", threads.ratio("1", "2"), "x", ">=", 1.8),
     ]
 
 

@@ -10,29 +10,31 @@ from __future__ import annotations
 import json
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
+from matplotlib.ticker import EngFormatter
 from tqdm import tqdm
 
 from agents.evaluation.scoring import run_episodes
-from agents.files import read_json, write_json
-from agents.learning.algorithms import algorithm_named
-from agents.learning.checkpoint import Arrays, read_checkpoint
+from agents.learning.algorithms import settings_for, train
+from agents.learning.recorder import Arrays, read_checkpoint
 from agents.observations import ObservationLayout
 from agents.policies.policy import Policy, PolicyCard
 from agents.policies.storage import save, task_of
 from agents.registry import env_id_of
-from benchmarks.learning_plot import save_comparison
 from benchmarks.machine import machine
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.files import read_json, write_json
+from lean_yaw_env.rendering.figures import new_figure, save_figure
+from lean_yaw_env.rendering.palette import AGENT_COLOURS, unit_colour
 
 RESULTS = Path(__file__).parent / "results"
-ALGORITHMS = ("apg", "ppo")
+NAMES = {"apg": "gradient agent", "ppo": "PPO"}
 EPISODES = 100  # of a look at a policy while it is trained
 LOOKS = 12  # at most, in a training
 
@@ -117,16 +119,15 @@ def learn(
     env_id: str, algorithm: str, seed: int, steps: int | None, progress: bool = True
 ) -> tuple[Curve, Policy]:
     """Train once, looking at the policy now and then."""
-    found = algorithm_named(algorithm)
-    settings = found.settings_for(env_id)
+    settings = settings_for(algorithm, task_of(env_id))
     if steps is not None:
         settings = replace(settings, steps=steps)
     curve = Curve(algorithm, seed, json.loads(json.dumps(asdict(settings))))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "checkpoint.safetensors"
         watch = Watch(env_id, algorithm, curve, file, settings.steps // LOOKS)
-        trained = found.train(
-            env_id, settings, seed=seed, checkpoint=file, checkpoint_seconds=0.0, report=watch,
+        trained = train(
+            algorithm, env_id, settings, seed=seed, checkpoint=file, checkpoint_seconds=0.0, report=watch,
             progress=progress,
         )  # fmt: skip
     watch.finish(int(trained.policy.card.training["steps"]), trained.policy)
@@ -158,7 +159,7 @@ def table(curves: list[Curve], levels: list[float]) -> str:
     """Medians over seeds of steps and seconds to each level."""
     lines = [f"{'return':>8} {'algorithm':>10} {'seeds':>6} {'steps':>12} {'seconds':>9}"]
     for level in levels:
-        for algorithm in ALGORITHMS:
+        for algorithm in NAMES:
             reached = [c.reaches(level) for c in curves if c.algorithm == algorithm]
             if reached:
                 steps, seconds = np.median(np.array(reached), axis=0)
@@ -166,6 +167,44 @@ def table(curves: list[Curve], levels: list[float]) -> str:
                     f"{level:8g} {algorithm:>10} {len(reached):6d} {steps:12,.0f} {seconds:9.1f}"
                 )
     return "\n".join(lines)
+
+
+def save_comparison(curves: list[Curve], task: str, machine: Mapping[str, Any], path: Path) -> None:
+    """Draw each training thin and the median of each algorithm's thick, on logarithmic axes of cost; the picture is written whole."""
+    figure = new_figure(10.0, 4.2)
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, cost in zip(panels, ("steps", "seconds"), strict=True):
+        for algorithm, name in NAMES.items():
+            colour = unit_colour(AGENT_COLOURS[algorithm])
+            own = [curve for curve in curves if curve.algorithm == algorithm]
+            for curve in own:
+                axes.plot(getattr(curve, cost), curve.returns, color=colour, linewidth=0.7, alpha=0.5)  # fmt: skip
+            if own:
+                label = f"{name}, median of {len(own)}" if len(own) > 1 else f"{name}, one training"  # fmt: skip
+                axes.plot(*_median(own, cost), color=colour, linewidth=2.2, label=label)
+        axes.set_xscale("log")
+        axes.grid(color="0.9", which="both")
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+    panels[0].xaxis.set_major_formatter(EngFormatter(sep=""))
+    panels[0].set_xlabel("walking steps trained (k: thousands, M: millions)")
+    panels[1].xaxis.set_major_formatter(EngFormatter(sep=""))
+    panels[1].set_xlabel("processor seconds of one core")
+    panels[0].set_ylabel("return of a held-out episode")
+    panels[0].legend(loc="lower right", frameon=False)
+    figure.suptitle(
+        f"{task}: score while training, without exploration ({machine['processor']})", fontsize=11
+    )
+    save_figure(figure, path)
+
+
+def _median(curves: list[Curve], cost: str) -> tuple[Any, Any]:
+    """The median return at costs that every training came to, interpolated between looks."""
+    costs = [np.array(getattr(curve, cost), dtype=float) for curve in curves]
+    low, high = max(c[0] for c in costs), min(c[-1] for c in costs)
+    grid = np.geomspace(low, high, 100)
+    values = [np.interp(grid, c, curve.returns) for c, curve in zip(costs, curves, strict=True)]
+    return grid, np.median(values, axis=0)
 
 
 def main(

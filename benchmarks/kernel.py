@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from benchmarks.bars import Figure, command_line
 from benchmarks.loops import step_each
 from benchmarks.measure import FULL, SMALLEST, Timings, measure
+from benchmarks.measurements import Measurement, command_line
 from benchmarks.populations import Population, perturbed_gait, slow_near_falls
 from benchmarks.scipy_step import ScipyStep
 from lean_yaw_env import Walker
@@ -84,8 +84,8 @@ def mean_evaluations(population: Population) -> float:
     return float(population.outcomes[:, EVALUATIONS].mean())
 
 
-def run(smallest: bool) -> list[Figure]:
-    """All figures of the kernel."""
+def run(smallest: bool) -> list[Measurement]:
+    """All measurements of the kernel."""
     n, effort = (SMALLEST_WALKERS, SMALLEST) if smallest else (WALKERS, FULL)
     compared = 2 if smallest else COMPARED
     resting, moving = perturbed_gait(n), perturbed_gait(n, moving=True)
@@ -100,47 +100,49 @@ def run(smallest: bool) -> list[Figure]:
     )
     return [
         *_rates(times, n, compared),
-        Figure("batch_two_cores_steps_per_second", n / shared.median("two"), "1/s"),
+        Measurement("batch_two_cores_steps_per_second", n / shared.median("two"), "1/s"),
         *_ratios(times, n, compared),
-        Figure("two_cores_over_one", shared.ratio("one", "two"), "x", ">=", 1.8),
-        Figure(
+        Measurement("two_cores_over_one", shared.ratio("one", "two"), "x", ">=", 1.8),
+        Measurement(
             "max_abs_error", largest_error(resting, compared), "", "<=", ACCURATE, "masses at rest"
         ),
-        Figure(
+        Measurement(
             "moving_max_abs_error", largest_error(moving, compared), "", "<=", ACCURATE, "moving"
         ),
-        Figure("evaluations", mean_evaluations(resting), "a step", "<=", 40.0, "gait perturbed"),
-        Figure(
+        Measurement("evaluations", mean_evaluations(resting), "a step", "<=", 40.0, "gait perturbed"),
+        Measurement(
             "near_fall_evaluations", mean_evaluations(slow_near_falls(n)), "a step", "<=", 75.0,
             "slow near-falls",
         ),
-        Figure("moving_evaluations", mean_evaluations(moving), "a step", note="masses moving"),
+        Measurement("moving_evaluations", mean_evaluations(moving), "a step", note="masses moving"),
     ]  # fmt: skip
 
 
-def _rates(times: Timings, n: int, compared: int) -> list[Figure]:
+def _rates(times: Timings, n: int, compared: int) -> list[Measurement]:
     names = {
         "scalar_steps_per_second": "scalar",
         "batch_steps_per_second": "batch",
         "moving_scalar_steps_per_second": "moving scalar",
         "moving_batch_steps_per_second": "moving batch",
     }
-    figures = [Figure(name, n / times.median(case), "1/s") for name, case in names.items()]
+    measured = [Measurement(name, n / times.median(case), "1/s") for name, case in names.items()]
     return [
-        *figures,
-        Figure("solve_ivp_steps_per_second", compared / times.median("scipy"), "1/s"),
-        Figure("single_call", times.median("single") * 1e6, "us", "<=", 3.0, "from Python"),
-        Figure("jacobian_call", times.median("jacobian") * 1e6, "us", note="state and command"),
+        *measured,
+        Measurement("solve_ivp_steps_per_second", compared / times.median("scipy"), "1/s"),
+        Measurement("single_call", times.median("single") * 1e6, "us", "<=", 3.0, "from Python"),
+        Measurement(
+            "jacobian_call", times.median("jacobian") * 1e6, "us", note="state and command"
+        ),
     ]
 
 
-def _ratios(times: Timings, n: int, compared: int) -> list[Figure]:
+def _ratios(times: Timings, n: int, compared: int) -> list[Measurement]:
     over_scipy = times.ratio("scipy", "batch") * n / compared
     return [
-        Figure("batch_over_scalar", times.ratio("scalar", "batch"), "x", ">=", 4.0, "one core"),
-        Figure("moving_batch_over_scalar", times.ratio("moving scalar", "moving batch"), "x", ">=", 3.0),
-        Figure("batch_over_solve_ivp", over_scipy, "x", ">=", 2000.0, "DOP853, also within 1e-10"),
-        Figure("jacobian_over_single_call", times.ratio("jacobian", "single"), "x", "<=", 14.0),
+        Measurement("batch_over_scalar", times.ratio("scalar", "batch"), "x", ">=", 4.0, "one core"),
+        Measurement("moving_batch_over_scalar", times.ratio("moving scalar", "moving batch"), "x", ">=", 3.0),
+        Measurement("batch_over_solve_ivp", over_scipy, "x", ">=", 2000.0, "DOP853, also within 1e-10"),
+        Measurement("jacobian_over_single_call", times.ratio("jacobian", "single"), "x", "<=", 14.0),
     ]  # fmt: skip
 
 

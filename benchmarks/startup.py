@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 import lean_yaw_env
-from benchmarks.bars import Figure, command_line
+from benchmarks.measurements import Measurement, command_line
 
 PROGRAM = """
 import time
@@ -53,21 +53,21 @@ def without_cache(folder: Path) -> tuple[Path, dict[str, str]]:
     return package, {"HOME": nowhere, "XDG_CACHE_HOME": nowhere, "NUMBA_CACHE_DIR": nowhere}
 
 
-def run(smallest: bool) -> list[Figure]:
-    """All figures of the start: processor seconds, which a busy machine does not stretch."""
+def run(smallest: bool) -> list[Measurement]:
+    """All measurements of the start: processor seconds, which a busy machine does not stretch."""
     package = Path(lean_yaw_env.__file__).parent
     if smallest:  # as it is, whatever is compiled already
-        return [Figure("start", start(package, {})[0], "s")]
+        return [Measurement("start", start(package, {})[0], "s")]
     with tempfile.TemporaryDirectory() as name:
         cache = {"NUMBA_CACHE_DIR": str(Path(name) / "cache")}
         cold, _ = start(package, cache)
         warm = sorted(start(package, cache)[0] for _ in range(WARM_RUNS))
         uncached, warned = start(*without_cache(Path(name) / "copy"))
     return [
-        Figure("cold_start", cold, "s", "<=", 15.0, "nothing compiled yet"),
-        Figure("warm_start", warm[WARM_RUNS // 2], "s", "<=", 1.5, "compiled code on disk"),
-        Figure("uncached_start", uncached, "s", note="no folder for compiled code"),
-        Figure("uncached_warnings", warned, "", "<=", 1.0, "no folder for compiled code"),
+        Measurement("cold_start", cold, "s", "<=", 15.0, "nothing compiled yet"),
+        Measurement("warm_start", warm[WARM_RUNS // 2], "s", "<=", 1.5, "compiled code on disk"),
+        Measurement("uncached_start", uncached, "s", note="no folder for compiled code"),
+        Measurement("uncached_warnings", warned, "", "<=", 1.0, "no folder for compiled code"),
     ]
 
 

@@ -15,10 +15,11 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecEnv
 
-from agents.learning.ppo_settings import PPOSettings, settings_for
-from benchmarks.bars import Figure, command_line
+from agents.learning.algorithms import settings_for
+from agents.learning.ppo import PPOSettings
 from benchmarks.environments import HEADING, kernel_alone
 from benchmarks.measure import SMALLEST, Effort, measure
+from benchmarks.measurements import Measurement, command_line
 from lean_yaw_env.envs.sb3 import WalkerVecEnv
 
 ROLLOUTS = 5
@@ -100,9 +101,9 @@ def _parts(model: PPO, env: WalkerVecEnv, effort: Effort) -> dict[str, float]:
     return {name: times.median(name) for name in ("physics", "env", "policy")}
 
 
-def run(smallest: bool) -> list[Figure]:
-    """All figures of training, in microseconds of processor time for each walking step collected."""
-    settings = settings_for(HEADING)
+def run(smallest: bool) -> list[Measurement]:
+    """All measurements of training, in microseconds of processor time for each walking step collected."""
+    settings = settings_for("ppo", "Heading")
     walkers, steps, rollouts = (4, 8, 1) if smallest else (
         settings.walkers, settings.steps_per_update, ROLLOUTS,
     )  # fmt: skip
@@ -122,18 +123,18 @@ def run(smallest: bool) -> list[Figure]:
     each = {name: seconds * 1e6 / walkers for name, seconds in parts.items()}
     rest = collecting - each["env"] - each["policy"]
     return [
-        Figure("training_physics", each["physics"], "us", note="the batch kernel"),
-        Figure(
+        Measurement("training_physics", each["physics"], "us", note="the batch kernel"),
+        Measurement(
             "training_observation", each["env"] - each["physics"], "us",
             note="observation, reward, ends, SB3's infos",
         ),
-        Figure("training_policy", each["policy"], "us", note="forward pass"),
-        Figure("training_bookkeeping", rest, "us", note="SB3's buffer and advantages"),
-        Figure("training_collecting", collecting, "us", note="all of the above"),
-        Figure("training_update", update, "us", note=f"{settings.epochs} epochs of gradient steps"),
-        Figure("training_dummy_collecting", dummy_collecting, "us", note="DummyVecEnv"),
-        Figure("dummy_over_native_collecting", dummy_collecting / collecting, "x", ">=", 4.0),
-        Figure(
+        Measurement("training_policy", each["policy"], "us", note="forward pass"),
+        Measurement("training_bookkeeping", rest, "us", note="SB3's buffer and advantages"),
+        Measurement("training_collecting", collecting, "us", note="all of the above"),
+        Measurement("training_update", update, "us", note=f"{settings.epochs} epochs of gradient steps"),
+        Measurement("training_dummy_collecting", dummy_collecting, "us", note="DummyVecEnv"),
+        Measurement("dummy_over_native_collecting", dummy_collecting / collecting, "x", ">=", 4.0),
+        Measurement(
             "update_over_collecting", update / collecting, "x", ">=", 1.0, "bound by the update"
         ),
     ]  # fmt: skip

@@ -1,15 +1,19 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and JSON that every reader takes."""
 
 from __future__ import annotations
 
 import contextlib
 import glob
+import json
+import math
 import os
 import secrets
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 _PREFIX = ".partial-"
+_INFINITIES = {"inf": math.inf, "-inf": -math.inf}
 
 
 def require_ending(path: str | os.PathLike[str], endings: tuple[str, ...]) -> Path:
@@ -45,15 +49,31 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_bytes(text.encode("utf-8"))
 
 
+def write_json(path: Path, value: Any) -> None:
+    """Write a value as JSON that every reader of JSON takes; infinite numbers become the strings "inf" and "-inf"."""
+    write_text(path, json.dumps(_plain(value), indent=2, allow_nan=False) + "\n")
+
+
+def read_json(path: Path) -> Any:
+    """Read JSON as ``write_json`` writes it, or raise ``ValueError`` naming the file."""
+    try:
+        return _unplain(json.loads(path.read_text(encoding="utf-8")))
+    except FileNotFoundError as error:
+        raise ValueError(f"there is no file {str(path)!r}") from error
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise ValueError(f"{str(path)!r} is not JSON: {error}") from error
+
+
 def remove_partial(path: Path) -> None:
     """Remove what processes that no longer run left of ``path`` while they wrote it."""
     for left in path.parent.glob(f"{_PREFIX}*-{glob.escape(path.stem)}-*{path.suffix}"):
         writer = left.name.removeprefix(_PREFIX).split("-", 1)[0]
-        if not (writer.isdigit() and _is_running(int(writer))):
+        if not (writer.isdigit() and is_running(int(writer))):
             left.unlink(missing_ok=True)
 
 
-def _is_running(process: int) -> bool:
+def is_running(process: int) -> bool:
+    """Whether a process of this machine runs, by its id."""
     if os.name == "nt":  # where signal 0 is no question but Ctrl-C
         return True
     try:
@@ -63,3 +83,21 @@ def _is_running(process: int) -> bool:
     except PermissionError:  # another user's
         return True
     return True
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and math.isinf(value):
+        return "inf" if value > 0.0 else "-inf"
+    return value
+
+
+def _unplain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _unplain(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_unplain(item) for item in value]
+    return _INFINITIES.get(value, value) if isinstance(value, str) else value

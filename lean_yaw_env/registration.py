@@ -23,16 +23,34 @@ ENV_IDS = tuple(f"{NAMESPACE}/{name}-v{version}" for name, version in TASK_VERSI
 GOAL_ENV_ID = f"{NAMESPACE}/WaypointGoal-v0"
 """Waypoint for goal-conditioned learners: the one environment whose observations are dictionaries."""
 
+TASK_IDS: dict[str, str] = {}
+"""The name of the task of each registered id."""
+
+
+def name_of_task(task: str) -> str:
+    """A task's name, from itself or from an environment id of it (which may begin with a module to import, as for ``gymnasium.make``)."""
+    return TASK_IDS.get(task.rsplit(":", 1)[-1], task) if isinstance(task, str) else task
+
+
+def register_id(env_id: str, task: str, *, reward_threshold: float | None = None) -> None:
+    """Register an id for a task, unless it is registered already."""
+    TASK_IDS[env_id] = task
+    if env_id not in registry:
+        register(
+            id=env_id,
+            entry_point=f"lean_yaw_env.envs.made:{task}",
+            vector_entry_point=f"lean_yaw_env.envs.made:{task}Vector",
+            reward_threshold=reward_threshold,
+        )
+
 
 def register_envs() -> None:
     """Register every environment that is not registered yet; calling it again does nothing."""
     for name, env_id in zip(TASK_VERSIONS, ENV_IDS, strict=True):
-        if env_id not in registry:
-            register(
-                id=env_id,
-                entry_point="lean_yaw_env.envs.walker_env:WalkerEnv",
-                vector_entry_point="lean_yaw_env.envs.vector_env:WalkerVectorEnv",
-                kwargs={"task": name},
-            )
+        register_id(env_id, name)
     if GOAL_ENV_ID not in registry:
-        register(id=GOAL_ENV_ID, entry_point="lean_yaw_env.envs.goal_env:WaypointGoalEnv")
+        register(
+            id=GOAL_ENV_ID,
+            entry_point="lean_yaw_env.envs.goal_env:WaypointGoalEnv",
+            vector_entry_point="lean_yaw_env.envs.goal_env:WaypointGoalVectorEnv",
+        )

@@ -137,5 +137,5 @@ def test_bad_names_shapes_gains_and_tasks_are_refused_by_name():
         FixedController().predict(np.float32(1.0))
     with pytest.raises(ValueError, match="proportional must be a finite number"):
         HeadingGains(proportional=math.nan)
-    with pytest.raises(ValueError, match="task must show heading_error"):
+    with pytest.raises(ValueError, match="task must be one that shows heading_error"):
         HeadingFeedback("Walk")

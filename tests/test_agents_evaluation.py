@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from agents import FixedController, HeadingFeedback, RandomController
-from agents.evaluate import app
+from agents.command_line import app
 from agents.evaluation import scoring
 from agents.evaluation.results import Results, Row, summary
 from agents.evaluation.scoring import evaluate, run_episodes
@@ -109,7 +109,7 @@ def test_the_table_and_the_json_hold_every_row():
 
 
 def test_the_command_line_takes_agents_one_after_the_other():
-    arguments = ["--task", "Walk", "--agents", "fixed", "random", "--episodes", "2", "--seed", "1", "--json"]  # fmt: skip
+    arguments = ["evaluate", "--task", "Walk", "--agents", "fixed", "random", "--episodes", "2", "--seed", "1", "--json"]  # fmt: skip
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
     rows = json.loads(result.stdout)
@@ -118,7 +118,7 @@ def test_the_command_line_takes_agents_one_after_the_other():
 
 
 def test_tasks_and_agents_may_be_repeated_or_separated_by_commas():
-    arguments = ["--task", "Walk,Push", "--task", "Walk", "--agents", "random,fixed", "--agents", "fixed"]  # fmt: skip
+    arguments = ["evaluate", "--task", "Walk,Push", "--task", "Walk", "--agents", "random,fixed", "--agents", "fixed"]  # fmt: skip
     short = ["--episodes", "2", "--processes", "1", "--json"]
     result = CliRunner().invoke(app, [*arguments, *short])
     assert result.exit_code == 0, result.output
@@ -133,14 +133,14 @@ def test_tasks_and_agents_may_be_repeated_or_separated_by_commas():
     [
         (["--task", "Fly"], "task must be one of"),
         (["--task", "Walk", "--agents", "feedback"], "feedback is an agent for Heading"),
-        (["--agents", "nobody"], "agents must be among"),
-        (["--agents", "fixed", "--episodes", "0"], "episodes must be in"),
-        (["--agents", "fixed", "--seed", "-1"], "seed must be in"),
+        (["--agents", "nobody"], "agent must be one of"),
+        (["--agents", "fixed", "--episodes", "0"], "episodes must be from"),
+        (["--agents", "fixed", "--seed", "-1"], "seed must be from"),
         (["--agents", "ppo", "--agent-path", "nowhere"], "there is no file"),
     ],
 )
 def test_the_command_line_refuses_bad_values_by_name(arguments, message):
-    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "400"})
+    result = CliRunner().invoke(app, ["evaluate", *arguments], env={"COLUMNS": "400"})
     assert result.exit_code == 2
     assert message in result.output
 

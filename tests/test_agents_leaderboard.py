@@ -11,15 +11,24 @@ import pytest
 from typer.testing import CliRunner
 
 from agents import FixedController, RandomController
-from agents.evaluate import app
-from agents.evaluation import agenda
-from agents.evaluation.agenda import Entrant, walk_all
-from agents.evaluation.claims import best_feedback, claims_of, compare, judged_rows, samples_of
-from agents.evaluation.documents import Circumstances, leaderboard_page
-from agents.evaluation.leaderboard import make_leaderboard
-from agents.evaluation.push_levels import LevelRow, level_entrants, level_rows
-from agents.evaluation.recording import record_episode
-from agents.evaluation.reporting import Evaluation
+from agents.command_line import app
+from agents.evaluation import plan
+from agents.evaluation.comparison import (
+    best_feedback,
+    compare,
+    expectations_of,
+    samples_of,
+    task_rows,
+)
+from agents.evaluation.footprints import record_episode
+from agents.evaluation.leaderboard import (
+    Circumstances,
+    leaderboard_page,
+    level_candidates,
+    level_rows,
+    make_leaderboard,
+)
+from agents.evaluation.plan import Candidate, Evaluation, run_all
 from agents.evaluation.results import RETURN, SURVIVAL, Episodes, Results, is_share
 from agents.evaluation.scoring import run_episodes
 from agents.registry import AGENTS, KINDS, AgentRequest, make_agent, make_all, names_for
@@ -117,7 +126,7 @@ def test_rows_say_against_whom_and_leave_undefined_episodes_uncompared():
     results = walked("Heading", "fixed", returns(12.0), settled_fraction=holed)
     rows = {
         (row.agent, row.metric): row
-        for row in judged_rows(samples_of([results, SAMPLES["lqr"].results]))
+        for row in task_rows(samples_of([results, SAMPLES["lqr"].results]))
     }
     assert rows["fixed", RETURN].against == "lqr"
     assert rows["fixed", RETURN].verdict == "worse"
@@ -126,13 +135,13 @@ def test_rows_say_against_whom_and_leave_undefined_episodes_uncompared():
     assert rows["lqr", RETURN].against is None
 
 
-def test_claims_are_random_below_fixed_below_feedback_below_learned():
-    claims = claims_of("Heading", SAMPLES)
-    assert [(claim.worse, claim.better, claim.holds) for claim in claims] == [
+def test_random_is_expected_below_fixed_below_feedback_below_learned():
+    expectations = expectations_of("Heading", SAMPLES)
+    assert [(each.worse, each.better, each.holds) for each in expectations] == [
         ("random", "fixed", True), ("fixed", "lqr", True), ("lqr", "ppo", True),
     ]  # fmt: skip
     few = {name: SAMPLES[name] for name in ("lqr", "feedback")}
-    assert not any(claim.holds for claim in claims_of("Heading", few))
+    assert not any(each.holds for each in expectations_of("Heading", few))
 
 
 def test_every_agent_has_a_kind_and_is_made_for_its_tasks_alone():
@@ -153,18 +162,18 @@ def test_learned_agents_are_there_where_a_training_is_found(tmp_path: Path):
 
 
 def test_episodes_walked_in_parts_are_those_of_one_evaluation(monkeypatch):
-    monkeypatch.setattr(agenda, "_SHARE", 4)
-    found = walk_all([Entrant("Walk", "fixed", EPISODES, SHORT)], seed=3)[0].results
+    monkeypatch.setattr(plan, "_CHUNK", 4)
+    found = run_all([Candidate("Walk", "fixed", EPISODES, SHORT)], seed=3)[0].results
     whole = run_episodes(FixedController(), "Walk", episodes=EPISODES, seed=3, options=SHORT)
     for name, values in whole.metrics.items():
         assert np.array_equal(found.values(name)[0], values)
 
 
 def test_an_interrupted_evaluation_goes_on_and_loses_nothing(tmp_path: Path, monkeypatch):
-    entrants = [Entrant("Walk", name, EPISODES, SHORT) for name in ("fixed", "random")]
-    expected = walk_all(entrants)
+    candidates = [Candidate("Walk", name, EPISODES, SHORT) for name in ("fixed", "random")]
+    expected = run_all(candidates)
 
-    real, calls = agenda.run_seeds, []
+    real, calls = plan.run_seeds, []
 
     def interrupted(*arguments, **options):
         calls.append(arguments)
@@ -172,54 +181,54 @@ def test_an_interrupted_evaluation_goes_on_and_loses_nothing(tmp_path: Path, mon
             raise KeyboardInterrupt
         return real(*arguments, **options)
 
-    monkeypatch.setattr(agenda, "run_seeds", interrupted)
+    monkeypatch.setattr(plan, "run_seeds", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        walk_all(entrants, cache=tmp_path)
+        run_all(candidates, cache=tmp_path)
     assert len(list(tmp_path.iterdir())) == 1
-    again = walk_all(entrants, cache=tmp_path)
+    again = run_all(candidates, cache=tmp_path)
     assert len(calls) == 3  # the first agent's are not walked again
     for one, other in zip(expected, again, strict=True):
         assert np.array_equal(one.results.values(RETURN), other.results.values(RETURN))
-    assert walk_all(entrants, cache=tmp_path)[0].seconds == again[0].seconds
+    assert run_all(candidates, cache=tmp_path)[0].seconds == again[0].seconds
     assert len(calls) == 3
 
 
 def test_kept_episodes_are_not_taken_for_other_ones(tmp_path: Path):
-    entrant = Entrant("Walk", "fixed", 2, SHORT)
-    walk_all([entrant], cache=tmp_path)
+    candidate = Candidate("Walk", "fixed", 2, SHORT)
+    run_all([candidate], cache=tmp_path)
     for other in (
-        replace(entrant, episodes=3),
-        replace(entrant, options=EnvOptions(horizon=7.0)),
-        replace(entrant, agent="random"),
+        replace(candidate, episodes=3),
+        replace(candidate, options=EnvOptions(horizon=7.0)),
+        replace(candidate, agent="random"),
     ):
         before = len(list(tmp_path.iterdir()))
-        walk_all([other], cache=tmp_path)
+        run_all([other], cache=tmp_path)
         assert len(list(tmp_path.iterdir())) == before + 1
-    walk_all([entrant], seed=1, cache=tmp_path)
+    run_all([candidate], seed=1, cache=tmp_path)
     assert len(list(tmp_path.iterdir())) == 5
 
 
 def test_a_damaged_file_is_walked_again(tmp_path: Path):
-    entrant = Entrant("Walk", "fixed", 2, SHORT)
-    first = walk_all([entrant], cache=tmp_path)[0]
+    candidate = Candidate("Walk", "fixed", 2, SHORT)
+    first = run_all([candidate], cache=tmp_path)[0]
     next(tmp_path.iterdir()).write_bytes(b"PK damaged")
-    again = walk_all([entrant], cache=tmp_path)[0]
+    again = run_all([candidate], cache=tmp_path)[0]
     assert np.array_equal(first.results.values(RETURN), again.results.values(RETURN))
 
 
 def test_two_processes_give_the_results_of_one(monkeypatch):
-    monkeypatch.setattr(agenda, "_WORTH_PROCESSES", 2)
-    entrants = [Entrant("Walk", name, 3, SHORT) for name in ("fixed", "random")]
-    for one, two in zip(walk_all(entrants), walk_all(entrants, processes=2), strict=True):
+    monkeypatch.setattr(plan, "_WORTH_PROCESSES", 2)
+    candidates = [Candidate("Walk", name, 3, SHORT) for name in ("fixed", "random")]
+    for one, two in zip(run_all(candidates), run_all(candidates, processes=2), strict=True):
         assert np.array_equal(one.results.values(RETURN), two.results.values(RETURN))
 
 
 def test_push_levels_are_walked_by_the_agents_of_push_alone():
-    push = Entrant("Push", "fixed", EPISODES, SHORT)
-    entrants = level_entrants([push, Entrant("Walk", "fixed", EPISODES, SHORT)], (0.1, 2.0))
-    assert [each.options.push_level for each in entrants] == [0.1, 2.0]
-    rows = level_rows(walk_all([push, *entrants]))
-    assert [each.level for each in rows] == [task_named("Push").push_level, 0.1, 2.0]
+    push = Candidate("Push", "fixed", EPISODES, SHORT)
+    candidates = level_candidates([push, Candidate("Walk", "fixed", EPISODES, SHORT)], (0.1, 2.0))
+    assert [each.options.push_level for each in candidates] == [0.1, 2.0]
+    rows = level_rows(run_all([push, *candidates]))
+    assert list(rows) == sorted([0.1, task_named("Push").push_level, 2.0])
 
 
 def test_a_recorded_episode_keeps_goals_and_path():
@@ -234,10 +243,10 @@ def test_a_recorded_episode_keeps_goals_and_path():
 
 def test_the_leaderboard_holds_every_agent_and_the_command_that_made_it(tmp_path: Path):
     evaluation = Evaluation(episodes=4, options=SHORT, cache=tmp_path / "kept", progress=False)
-    tasks, names = ["Walk", "Push"], ["random", "fixed"]
-    rows = make_leaderboard(tasks, names, evaluation, tmp_path / "docs", "make it")
+    candidates = evaluation.candidates(["Walk", "Push"], ["random", "fixed"])
+    rows = make_leaderboard(candidates, evaluation, tmp_path / "docs", "make it")
     page = (tmp_path / "docs" / "leaderboard.md").read_text()
-    assert page.startswith("# Leaderboard\n\nWritten by `make it`")
+    assert page.startswith("# Leaderboard\n\nThis page is generated by `make it`")
     for words in ("## Walk", "## Push", "| random | baseline |", "random < fixed", "0.2 | 0.4"):
         assert words in page
     with open(tmp_path / "docs" / "leaderboard.csv", newline="") as file:
@@ -255,30 +264,31 @@ def test_a_page_says_plainly_what_does_not_hold():
         ]
     )
     made = Circumstances("make it", 0, 60.0, "a machine")
-    page = leaderboard_page(judged_rows(samples), {"Heading": samples}, [], made)
-    assert "no: no difference to lqr is shown" in page
+    page = leaderboard_page(task_rows(samples), {"Heading": samples}, [], made)
+    assert "no: no significant difference from lqr" in page
     assert "no: sac is worse than lqr" in page
     assert "**ppo** is better than the best feedback controller on no task" in page
 
 
 def test_pictures_alone_are_drawn_by_one_option(tmp_path: Path):
-    arguments = ["--task", "Waypoint", "--agents", "fixed", "--pictures", str(tmp_path)]
+    arguments = ["evaluate", "--task", "Waypoint", "--agents", "fixed", "--pictures", str(tmp_path)]
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
     assert [path.name for path in tmp_path.iterdir()] == ["footprints_waypoint.png"]
 
 
 def test_level_rows_are_written_once_for_each_agent_and_level():
-    rows = level_rows(walk_all([Entrant("Push", "fixed", 2, SHORT)]))
-    assert isinstance(rows[0], LevelRow)
-    assert rows[0].row.metric == "survived_200_steps"
+    rows = level_rows(run_all([Candidate("Push", "fixed", 2, SHORT)]))
+    ((level, (row,)),) = rows.items()
+    assert level == task_named("Push").push_level
+    assert row.metric == "survived_200_steps"
 
 
 def test_bad_numbers_and_runs_of_other_episodes_are_refused():
-    with pytest.raises(ValueError, match="episodes must be in"):
-        Entrant("Walk", "fixed", 0, SHORT)
-    with pytest.raises(ValueError, match="processes must be in"):
-        walk_all([], processes=0)
+    with pytest.raises(ValueError, match="episodes must be from"):
+        Candidate("Walk", "fixed", 0, SHORT)
+    with pytest.raises(ValueError, match="processes must be from"):
+        run_all([], processes=0)
     one, two = (walked("Walk", "fixed", np.ones((1, n))).runs[0] for n in (2, 3))
     with pytest.raises(ValueError, match="runs must be one or more of the same episodes"):
         Results("Walk", "fixed", (one, two))

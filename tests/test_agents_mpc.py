@@ -5,18 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import optuna
 import pytest
 
 from agents import AgentRequest, make_agent
 from agents.controllers.mpc import MpcController
 from agents.controllers.mpc_rollouts import Rollouts
-from agents.controllers.mpc_settings import SETTINGS, MpcSettings, Spread
+from agents.controllers.mpc_settings import MpcSettings, PlanSpread
 from agents.controllers.simple import FixedController
-from agents.controllers.tune_mpc import STEPS_PER_DECISION, suggested, tune
-from agents.evaluation.recording import record_episode
+from agents.evaluation.footprints import record_episode
 from agents.evaluation.scoring import run_seeds
 from agents.seeds import TUNING_SEEDS
+from agents.settings import tuned
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.envs.walker_env import WalkerEnv
@@ -133,7 +132,9 @@ def test_planning_alone_steers():
 
 def test_fewer_scenarios_than_kept_already_stay_up_longer_under_pushes_than_the_fixed_controller():
     options = EnvOptions(horizon=60.0)
-    planner = MpcController("Push", options, replace(SETTINGS["Push"], scenarios=4))
+    planner = MpcController(
+        "Push", options, replace(tuned("mpc", "Push", MpcSettings()), scenarios=4)
+    )
     seeds = range(TUNING_SEEDS, TUNING_SEEDS + 8)
     planned = run_seeds(planner, "Push", seeds, options=options)
     fixed = run_seeds(FixedController(), "Push", seeds, options=options)
@@ -143,7 +144,6 @@ def test_fewer_scenarios_than_kept_already_stay_up_longer_under_pushes_than_the_
 
 @pytest.mark.parametrize("task", list(TASK_VERSIONS))
 def test_every_task_has_settings_and_a_planner_that_walks(task):
-    assert task in SETTINGS
     options = EnvOptions(horizon=3.0)
     # the regulators would take most of the time: their gaits are found at first use
     planner = MpcController(task, options, base=FixedController())
@@ -168,43 +168,6 @@ def test_planners_work_for_recording_and_delayed_actions_and_bodies_unknown():
     options = EnvOptions(action_delay=True, random_body="held-out", horizon=10.0)
     planner = MpcController("Heading", options, TINY)
     assert record_episode(planner, "Heading", seed=TUNING_SEEDS, options=options).fall is None
-
-
-def test_a_search_returns_the_best_of_what_it_tried_and_of_what_is_kept(monkeypatch):
-    tried = []
-
-    def returns(task, settings, episodes, horizon):
-        tried.append(settings)
-        return 1.0 if len(tried) == 1 else 2.0 - abs(settings.trust - 5.0)
-
-    monkeypatch.setattr("agents.controllers.tune_mpc._mean_return", returns)
-    settings, most = tune("Push", trials=6, episodes=1)
-    # those with too few plans to choose from are not walked
-    assert 3 <= len(tried) <= 7 and tried[0] == SETTINGS["Push"]
-    found = [1.0, *(2.0 - abs(each.trust - 5.0) for each in tried[1:])]
-    assert (settings, most) == (tried[int(np.argmax(found))], max(found))
-
-
-def test_a_search_walks_the_episodes_that_it_judges_by(monkeypatch):
-    # few plans, as what is tried there is of no interest here
-    monkeypatch.setattr("agents.controllers.tune_mpc.STEPS_PER_DECISION", 400)
-    settings, most = tune("Walk", trials=2, episodes=1, horizon=2.0)
-    assert settings.samples <= 100
-    # one reward unit and less for a unit of time
-    assert 0.0 < most <= 4.0
-
-
-@pytest.mark.parametrize("task", ["Push", "Level", "Heading"])
-def test_settings_tried_walk_no_more_steps_for_a_decision_than_allowed(task):
-    study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
-    for _ in range(20):
-        try:
-            tried = suggested(study.ask(), task)
-        except ValueError:
-            continue  # too few plans to choose from: such a trial fails
-        draws = max(tried.scenarios, 1)
-        steps = tried.samples * tried.iterations * (tried.horizon + tried.tail) * draws
-        assert steps <= STEPS_PER_DECISION
 
 
 @pytest.mark.parametrize(
@@ -237,7 +200,7 @@ def test_bad_settings_are_refused_by_name(bad):
 @pytest.mark.parametrize("bad", [{"angle": -0.1}, {"steady": 3.0}, {"angle": 0.0, "steady": 0.0}])
 def test_bad_spreads_are_refused(bad):
     with pytest.raises(ValueError, match="spread"):
-        Spread(**bad)
+        PlanSpread(**bad)
 
 
 def test_planning_needs_the_environment_that_it_is_for():

@@ -12,8 +12,8 @@ import safetensors.numpy
 import torch
 
 import agents
-from agents.learning.ppo import train_ppo
-from agents.learning.ppo_settings import PPOSettings
+from agents.learning.algorithms import train
+from agents.learning.ppo import PPOSettings
 from agents.observations import ObservationLayout
 from agents.policies import storage
 from agents.policies.policy import Policy, PolicyCard
@@ -241,7 +241,9 @@ def test_a_folder_s_policy_of_another_algorithm_is_refused(folder):
 
 def test_the_policy_taken_from_a_training_acts_as_the_trained_network(tmp_path):
     settings = PPOSettings(steps=64, walkers=4, steps_per_update=16, batch_size=64, epochs=1, hidden=(8, 6))  # fmt: skip
-    trained = train_ppo(ID, settings, seed=1, checkpoint=tmp_path / "c.safetensors", progress=False)
+    trained = train(
+        "ppo", ID, settings, seed=1, checkpoint=tmp_path / "c.safetensors", progress=False
+    )
     arrays = safetensors.numpy.load((tmp_path / "c.safetensors").read_bytes())
     names = ("mlp_extractor.policy_net.0", "mlp_extractor.policy_net.2", "action_net")
     observation = np.random.default_rng(0).normal(size=(20, FEATURES)).astype(np.float32)

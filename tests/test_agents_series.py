@@ -14,20 +14,21 @@ from typer.testing import CliRunner
 import train
 from agents.learning import series
 from agents.learning.curves import running_means
-from agents.learning.processes import RunError, run_side_by_side
-from agents.learning.results import TrainingLog
+from agents.learning.recorder import TrainingLog
 from agents.learning.series import (
+    RunError,
     new_series,
     parse_seeds,
     resumed,
     run_series,
+    run_side_by_side,
     runs_of,
-    spread_table,
+    seeds_table,
 )
-from agents.learning.ship import main as ship_main
-from agents.learning.training import is_finished, read_log, started_run
+from agents.learning.training import Training, is_finished, new_run, read_log
 from agents.policies import storage
 from agents.registry import newest_policy
+from agents.shipping import ship
 
 # the least that PPO's own settings for the task allow: one update
 TINY = {"steps": 4096, "episodes": 2, "checkpoint_seconds": 0.0}
@@ -101,23 +102,23 @@ def test_a_series_goes_on_with_what_is_unfinished_and_gathers_its_seeds(tmp_path
         for row in json.loads((place / "evaluation.json").read_text())
         if (row["agent"], row["metric"]) == ("ppo", "return")
     ]
-    own = next(spread for spread in result.spreads if spread.metric == "return")
+    own = next(each for each in result.by_seed if each.metric == "return")
     assert own.seeds == (0, 3)
     assert list(own.means) == means
     assert own.median == pytest.approx(np.mean(means))  # of two; rounding
     assert {"random", "fixed"} <= set(result.others["return"])
-    assert spread_table(result).row_count == len(result.spreads)
+    assert seeds_table(result).row_count == len(result.by_seed)
     with (folder / "seeds.csv").open() as file:
         assert next(csv.reader(file)) == ["metric", "median", "lowest", "highest", "seed0", "seed3"]
     assert (folder / "learning_curves.png").stat().st_size > 0
     assert newest_policy("LeanYaw/Walk-v0", tmp_path) == runs[3]
     monkeypatch.setattr(storage, "SHIPPED", tmp_path / "trained")
-    ship_main([folder])
+    ship(folder)
     assert storage.shipped_seeds("LeanYaw/Walk-v0") == [0, 3]
 
 
 def test_the_newest_of_runs_and_series_is_gone_on_with(tmp_path):
-    run_folder = started_run("Walk", tmp_path, None, TINY)
+    run_folder = new_run(Training.of_task("Walk", **TINY), tmp_path)
     folder = new_series("Walk", [0], tmp_path, TINY)
     for age, path in enumerate([folder / "series.json", run_folder / "run.json"]):
         os.utime(path, (1000.0 + age, 1000.0 + age))
@@ -147,7 +148,7 @@ def test_runs_side_by_side_finish_and_one_that_fails_is_named(tmp_path):
     [
         (["--seeds", "x"], "seeds must be as 5"),
         (["--seeds", "2", "--seed", "1"], "seeds must not be given together with"),
-        (["--seeds", "2", "--steps", "0"], "steps must be in"),
+        (["--seeds", "2", "--steps", "0"], "steps must be from"),
         (["--algorithm", "dqn"], "algorithm must be one of"),
         (["--resume", "--seeds", "2"], "leave out seeds"),
         (["--jobs", "0"], "--jobs"),

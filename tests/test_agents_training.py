@@ -14,18 +14,21 @@ from typer.testing import CliRunner
 
 import train
 from agents import Policy, load, save
-from agents.evaluate import app as evaluate_app
+from agents.command_line import app as agents_app
 from agents.evaluation.tables import rows_to_plain
-from agents.learning import keeper
-from agents.learning.checkpoint import CheckpointError, read_checkpoint, write_checkpoint
-from agents.learning.ppo import train_ppo
-from agents.learning.ppo_settings import SETTINGS, PPOSettings, settings_for
-from agents.learning.rollouts import TimeDiscountedBuffer
-from agents.learning.ship import ship
-from agents.learning.training import Training, new_run, read_run, resumed_run, run, started_run
+from agents.learning import sb3
+from agents.learning.algorithms import ALGORITHMS, settings_for
+from agents.learning.algorithms import train as train_agent
+from agents.learning.experience import TimeDiscountedBuffer
+from agents.learning.ppo import PPOSettings
+from agents.learning.recorder import CheckpointError, read_checkpoint, write_checkpoint
+from agents.learning.series import resumed
+from agents.learning.training import Training, new_run, read_run, run
 from agents.policies import storage
+from agents.settings import all_settings
+from agents.shipping import ship
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.registration import ENV_IDS
+from lean_yaw_env.registration import TASK_VERSIONS
 
 ID = "LeanYaw/Heading-v0"
 TINY = PPOSettings(
@@ -84,36 +87,36 @@ class Interruption(Exception):
 
 
 def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, monkeypatch):
-    whole = train_ppo(ID, TINY, seed=3, options=SHORT, progress=False)
+    whole = train_agent("ppo", ID, TINY, seed=3, options=SHORT, progress=False)
     checkpoint = tmp_path / "checkpoint.safetensors"
     arguments = {"seed": 3, "options": SHORT, "checkpoint": checkpoint, "checkpoint_seconds": 0.0, "progress": False}  # fmt: skip
-    original = keeper.Keeper._on_step
+    original = sb3._Callback._on_step
 
     def interrupted(self) -> bool:
         if self.num_timesteps > 800:  # in the midst of collecting experience
             raise Interruption
         return original(self)
 
-    monkeypatch.setattr(keeper.Keeper, "_on_step", interrupted)
+    monkeypatch.setattr(sb3._Callback, "_on_step", interrupted)
     with pytest.raises(Interruption):
-        train_ppo(ID, TINY, **arguments)
-    monkeypatch.setattr(keeper.Keeper, "_on_step", original)
+        train_agent("ppo", ID, TINY, **arguments)
+    monkeypatch.setattr(sb3._Callback, "_on_step", original)
     assert int(read_checkpoint(checkpoint)["count.steps"]) == 768  # the last update before
     np.random.seed(99)  # noqa: NPY002 - the resumed training must not depend on it
     torch.manual_seed(99)
-    resumed = train_ppo(ID, TINY, **arguments)
+    continued = train_agent("ppo", ID, TINY, **arguments)
     for name, weight in whole.policy.weights.items():
-        assert np.array_equal(weight, resumed.policy.weights[name]), name
-    assert np.array_equal(whole.log.steps, resumed.log.steps)
-    assert np.array_equal(whole.log.returns, resumed.log.returns)
+        assert np.array_equal(weight, continued.policy.weights[name]), name
+    assert np.array_equal(whole.log.steps, continued.log.steps)
+    assert np.array_equal(whole.log.returns, continued.log.returns)
     assert len(whole.log.returns) > TINY.walkers
-    assert resumed.policy.card.training["steps"] == TINY.steps
+    assert continued.policy.card.training["steps"] == TINY.steps
 
 
 def test_seeds_decide_a_training_and_different_ones_differ():
     small = PPOSettings(steps=256, walkers=8, steps_per_update=32, batch_size=128, epochs=1)
     one, same, other = (
-        train_ppo(ID, small, seed=seed, options=SHORT, progress=False).policy.weights
+        train_agent("ppo", ID, small, seed=seed, options=SHORT, progress=False).policy.weights
         for seed in (0, 0, 1)
     )
     assert np.array_equal(one["layers.0.weight"], same["layers.0.weight"])
@@ -123,7 +126,9 @@ def test_seeds_decide_a_training_and_different_ones_differ():
 def test_pushes_of_the_training_are_no_part_of_what_the_policy_is_for():
     small = PPOSettings(steps=256, walkers=8, steps_per_update=32, batch_size=128, epochs=1)
     pushed = PPOSettings(**vars(small) | {"push_level": 0.5})
-    calm, shaken = (train_ppo(ID, s, options=SHORT, progress=False).policy for s in (small, pushed))
+    calm, shaken = (
+        train_agent("ppo", ID, s, options=SHORT, progress=False).policy for s in (small, pushed)
+    )
     assert shaken.card.options == calm.card.options == SHORT
     assert shaken.card.settings["push_level"] == 0.5
     # pushes are seen, so that the statistics of observations differ
@@ -135,24 +140,24 @@ def test_pushes_of_the_training_are_no_part_of_what_the_policy_is_for():
 def test_training_leaves_torch_s_threads_as_they_were():
     before = torch.get_num_threads()
     small = PPOSettings(steps=64, walkers=4, steps_per_update=16, batch_size=64, epochs=1)
-    train_ppo(ID, small, threads=2, progress=False)
+    train_agent("ppo", ID, small, threads=2, progress=False)
     assert torch.get_num_threads() == before
 
 
 def test_a_checkpoint_of_another_training_or_a_damaged_one_is_refused(tmp_path):
     path = tmp_path / "checkpoint.safetensors"
-    train_ppo(ID, TINY, options=SHORT, checkpoint=path, progress=False)
+    train_agent("ppo", ID, TINY, options=SHORT, checkpoint=path, progress=False)
     other = PPOSettings(**vars(TINY) | {"hidden": (16, 16), "steps": 2560})
     with pytest.raises(CheckpointError, match="not of a training with these settings"):
-        train_ppo(ID, other, options=SHORT, checkpoint=path, progress=False)
+        train_agent("ppo", ID, other, options=SHORT, checkpoint=path, progress=False)
     arrays = read_checkpoint(path)
     del arrays["log.returns"]
     write_checkpoint(path, arrays)
     with pytest.raises(CheckpointError, match="holds no log"):
-        train_ppo(ID, TINY, options=SHORT, checkpoint=path, progress=False)
+        train_agent("ppo", ID, TINY, options=SHORT, checkpoint=path, progress=False)
     path.write_bytes(b"nothing of the kind")
     with pytest.raises(CheckpointError, match="no checkpoint can be read"):
-        train_ppo(ID, TINY, options=SHORT, checkpoint=path, progress=False)
+        train_agent("ppo", ID, TINY, options=SHORT, checkpoint=path, progress=False)
 
 
 def test_a_checkpoint_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
@@ -203,7 +208,7 @@ def test_finished_runs_are_shipped_and_loaded_by_id_and_others_are_refused(tmp_p
     with pytest.raises(ValueError, match=r"no policy can be loaded"):
         ship(folder)
     result = run(folder, progress=False)
-    shipped = ship(folder)
+    (shipped,) = ship(folder)
     assert shipped == tmp_path / "trained" / "Heading-v0" / "ppo" / "seed3"
     names = ["evaluation.json", "policy.json", "policy.safetensors"]
     assert sorted(path.name for path in shipped.iterdir()) == names
@@ -212,7 +217,7 @@ def test_finished_runs_are_shipped_and_loaded_by_id_and_others_are_refused(tmp_p
     assert rows == rows_to_plain([row for row in result.rows if row.agent == "ppo"])
     with pytest.raises(ValueError, match="replace it by --replace"):
         ship(folder)
-    assert ship(folder, replace=True) == shipped
+    assert ship(folder, replace=True) == [shipped]
     (folder / "evaluation.json").unlink()
     with pytest.raises(ValueError, match="is not finished"):
         ship(folder, replace=True)
@@ -225,17 +230,17 @@ def test_finished_runs_are_shipped_and_loaded_by_id_and_others_are_refused(tmp_p
 
 def test_finished_runs_are_not_resumed_and_unfinished_ones_are_found(tmp_path):
     with pytest.raises(ValueError, match="no unfinished training of Heading"):
-        resumed_run("Heading", tmp_path)
+        resumed("Heading", tmp_path)
     folder = new_run(tiny_training(), tmp_path)
-    assert resumed_run("Heading", tmp_path) == folder
+    assert resumed("Heading", tmp_path) == folder
     with pytest.raises(ValueError, match="no unfinished training of Walk"):
-        resumed_run("Walk", tmp_path)
+        resumed("Walk", tmp_path)
     with pytest.raises(ValueError, match="leave out seed"):
-        resumed_run("Heading", tmp_path, None, {"seed": 1})
+        resumed("Heading", tmp_path, None, {"seed": 1})
     for name in ("evaluation.json", "policy.json"):
         (folder / name).write_text("{}")
     with pytest.raises(ValueError, match="is finished"):
-        resumed_run("Heading", tmp_path, folder)
+        resumed("Heading", tmp_path, folder)
 
 
 def test_a_damaged_run_is_refused(tmp_path):
@@ -243,8 +248,6 @@ def test_a_damaged_run_is_refused(tmp_path):
     (folder / "run.json").write_text("[]")
     with pytest.raises(ValueError, match="is not a run's"):
         read_run(folder)
-    with pytest.raises(ValueError, match="run must not be given without --resume"):
-        started_run("Heading", tmp_path, folder)
 
 
 def test_the_command_line_trains_judges_and_is_found_by_the_evaluator(tmp_path):
@@ -256,8 +259,19 @@ def test_the_command_line_trains_judges_and_is_found_by_the_evaluator(tmp_path):
     assert again.exit_code == 2
     assert "no unfinished training" in again.output
     judged = CliRunner().invoke(
-        evaluate_app,
-        ["--task", "Walk", "--agents", "ppo", "--episodes", "2", "--runs", str(tmp_path), "--json"],
+        agents_app,
+        [
+            "evaluate",
+            "--task",
+            "Walk",
+            "--agents",
+            "ppo",
+            "--episodes",
+            "2",
+            "--runs",
+            str(tmp_path),
+            "--json",
+        ],
     )
     assert judged.exit_code == 0, judged.output
     assert {row["agent"] for row in json.loads(judged.stdout)} == {"ppo"}
@@ -267,10 +281,12 @@ def test_the_command_line_trains_judges_and_is_found_by_the_evaluator(tmp_path):
     ("arguments", "message"),
     [
         (["--task", "Fly"], "task must be one of"),
-        (["--steps", "0"], "steps must be in"),
-        (["--seed", "-1"], "seed must be in"),
-        (["--episodes", "0"], "episodes must be in"),
-        (["--threads", "0"], "threads must be in"),
+        (["--task", "WaypointGoal"], "observations are dictionaries"),
+        (["--steps", "0"], "steps must be from"),
+        (["--seed", "-1"], "seed must be from"),
+        (["--episodes", "0"], "episodes must be from"),
+        (["--threads", "0"], "threads must be from"),
+        (["--run", "runs/some"], "run must not be given without --resume"),
     ],
 )
 def test_the_command_line_refuses_bad_values_before_anything_is_written(
@@ -283,23 +299,31 @@ def test_the_command_line_refuses_bad_values_before_anything_is_written(
 
 
 def test_every_option_of_the_command_line_is_explained():
-    for app, options in [
-        (train.app, ("--task", "--seed", "--steps", "--out", "--resume", "--run", "--threads")),
-        (evaluate_app, ("--task", "--agents", "--episodes", "--seed", "--json", "--agent-path")),
+    options_of_training = ("--task", "--seed", "--steps", "--out", "--resume", "--run", "--threads")
+    for app, command, options in [
+        (train.app, [], options_of_training),
+        (agents_app, ["train"], options_of_training),
+        (agents_app, ["evaluate"], ("--task", "--agents", "--episodes", "--json", "--agent-path")),
+        (agents_app, ["tune"], ("--trials", "--storage", "--out", "--episodes", "--repeats")),
+        (agents_app, ["ship"], ("--replace",)),
+        (agents_app, ["film"], ("--task", "--agent", "--format")),
+        (agents_app, ["closed-loop"], ("--task", "--agents", "--out")),
     ]:
-        result = CliRunner().invoke(app, ["--help"], env={"COLUMNS": "200"})
+        result = CliRunner().invoke(app, [*command, "--help"], env={"COLUMNS": "200"})
         assert result.exit_code == 0
         assert all(option in result.output for option in options)
 
 
 def test_every_environment_has_settings_and_bad_ones_are_refused():
-    assert set(SETTINGS) <= set(ENV_IDS)
-    assert all(isinstance(settings_for(env_id), PPOSettings) for env_id in ENV_IDS)
-    with pytest.raises(ValueError, match="env_id must be one of"):
-        settings_for("CartPole-v1")
+    for algorithm, entry in ALGORITHMS.items():
+        assert set(all_settings()[algorithm]) <= set(TASK_VERSIONS)
+        for task in TASK_VERSIONS:
+            assert isinstance(settings_for(algorithm, task), entry.settings)
+    with pytest.raises(ValueError, match="task must be one of"):
+        settings_for("ppo", "CartPole")
     for values, message in [
         ({"batch_size": 1000}, "batch_size must divide the 32768 samples"),
-        ({"walkers": 0}, "walkers must be in"),
+        ({"walkers": 0}, "walkers must be from"),
         ({"push_level": -1.0}, "push_level must be in"),
         ({"time_constant": 0.0}, "time_constant must be in"),
         ({"gae_lambda": 1.5}, "gae_lambda must be in"),

@@ -10,9 +10,9 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from agents import FixedController
+from agents.command_line import app
 from agents.evaluation import videos
-from agents.evaluation.videos import agent_for, app, film_agent, record_steps
-from agents.evaluation.videos_push import RADIUS, draw_push
+from agents.evaluation.videos import DIAL_RADIUS, agent_for, draw_push, film_agent, record_steps
 from agents.seeds import evaluation_seed
 from lean_yaw_env.envs.walker_env import WalkerEnv
 
@@ -54,7 +54,7 @@ def test_a_push_is_drawn_on_its_dial_only_and_no_push_leaves_the_frame_alone():
     drawn = draw_push(frame, (-2.0, 0.0))
     changed = np.argwhere((drawn != frame).any(axis=-1))
     assert len(changed) > 100 and (frame == 200).all()
-    assert np.abs(changed[:, 1] - 240).max() <= RADIUS + 1 and changed[:, 0].max() < 70
+    assert np.abs(changed[:, 1] - 240).max() <= DIAL_RADIUS + 1 and changed[:, 0].max() < 70
     # forward is up: the arrow fills more of the dial's upper half
     inked = (np.abs(drawn.astype(int) - drawn[28, 240].astype(int)).sum(axis=-1) < 30)[:52, 200:280]
     assert inked[:27].sum() > 2 * inked[30:].sum()
@@ -89,6 +89,6 @@ def test_bad_arguments_are_refused_before_anything_is_written(tmp_path, argument
 
 @pytest.mark.parametrize("arguments", [["--task", "Nowhere"], ["--agent", "nobody"]])
 def test_the_command_refuses_names_it_does_not_know(tmp_path, arguments):
-    result = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "films")])
+    result = CliRunner().invoke(app, ["film", *arguments, "--out", str(tmp_path / "films")])
     assert result.exit_code == 2 and "must" in result.output
     assert not (tmp_path / "films").exists()

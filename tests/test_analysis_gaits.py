@@ -230,7 +230,7 @@ def test_bad_commands_are_refused_by_name() -> None:
         find_limit_cycle(TABLE_1, mass_offset=(0.0, 2.0))
     with pytest.raises(ValueError, match="takes no inter_leg_angle"):
         find_limit_cycle(point_feet(0.004), inter_leg_angle=0.2)
-    with pytest.raises(ValueError, match="must be a Walker or a PassiveWalker"):
+    with pytest.raises(ValueError, match="must be a Walker, a PassiveWalker or a SectionMap"):
         find_limit_cycle("walker")  # pyright: ignore[reportArgumentType]
     with pytest.raises(ValueError, match="odd number of steps"):
         ActiveMap(TABLE_1, mass_offset=(0.01, 0.01), n_steps=1)

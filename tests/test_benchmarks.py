@@ -1,4 +1,4 @@
-"""Each benchmark runs at its smallest size, and its reports hold together; no figure is judged."""
+"""Each benchmark runs at its smallest size, and its reports hold together; no value is judged."""
 
 from __future__ import annotations
 
@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 
 from benchmarks import environments, kernel, startup, training
-from benchmarks.bars import Figure, as_json, as_text
 from benchmarks.compare import as_text as comparison_text
-from benchmarks.compare import compare
+from benchmarks.compare import compare, save_plot
 from benchmarks.machine import machine
 from benchmarks.measure import SMALLEST, Timings, measure
-from benchmarks.plot import save_plot
+from benchmarks.measurements import Measurement, as_json, as_text
 
 REPOSITORY = Path(__file__).parents[1]
 KERNEL_KEYS = {
@@ -31,18 +30,18 @@ KERNEL_KEYS = {
 
 
 @pytest.mark.parametrize("benchmark", [kernel, environments, startup, training])
-def test_a_benchmark_runs_at_its_smallest_and_names_each_figure_once(
+def test_a_benchmark_runs_at_its_smallest_and_names_each_measurement_once(
     benchmark: ModuleType,
 ) -> None:
-    figures = benchmark.run(smallest=True)
-    names = [figure.name for figure in figures]
+    measured = benchmark.run(smallest=True)
+    names = [each.name for each in measured]
     assert len(set(names)) == len(names)
-    assert all(np.isfinite(figure.value) for figure in figures)
-    text = as_text(figures)
+    assert all(np.isfinite(each.value) for each in measured)
+    text = as_text(measured)
     assert all(name in text for name in names)
 
 
-def test_the_kernel_prints_one_json_object_with_the_figures_that_are_promised() -> None:
+def test_the_kernel_prints_one_json_object_with_the_values_that_are_promised() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks.kernel", "--json", "--smallest"],
         cwd=REPOSITORY, capture_output=True, text=True, check=True,
@@ -65,12 +64,12 @@ def test_the_comparison_is_sorted_plotted_and_says_what_each_peer_steps(tmp_path
     assert all(speed.name in comparison_text(speeds) for speed in speeds)
 
 
-def test_a_bar_is_met_from_its_own_side() -> None:
-    assert Figure("a", 2.0, "x", ">=", 2.0).verdict == "met"
-    assert Figure("a", 1.9, "x", ">=", 2.0).verdict == "missed"
-    assert Figure("a", 2.1, "us", "<=", 2.0).verdict == "missed"
-    assert Figure("a", 2.1, "us").verdict == ""
-    kept = as_json([Figure("a", 1.9, "x", ">=", 2.0), Figure("b", 3.0)])
+def test_a_target_is_met_from_its_own_side() -> None:
+    assert Measurement("a", 2.0, "x", ">=", 2.0).verdict == "met"
+    assert Measurement("a", 1.9, "x", ">=", 2.0).verdict == "missed"
+    assert Measurement("a", 2.1, "us", "<=", 2.0).verdict == "missed"
+    assert Measurement("a", 2.1, "us").verdict == ""
+    kept = as_json([Measurement("a", 1.9, "x", ">=", 2.0), Measurement("b", 3.0)])
     assert kept["a"] == 1.9
     assert kept["verdicts"] == {"a": "missed"}
     assert kept["machine"]["cores"] >= 1

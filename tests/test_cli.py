@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from lean_yaw_env import Walker, WalkerParameters, find_limit_cycle
-from lean_yaw_env.cli import app
+from lean_yaw_env.cli.app import app
 from lean_yaw_env.cli.axes import parse_axes, parse_range
 from lean_yaw_env.cli.rows import as_json
 from lean_yaw_env.cli.screen import text_of
@@ -24,6 +26,19 @@ def _json(*arguments: str) -> Any:
     result = runner.invoke(app, [*arguments, "--json"])
     assert result.exit_code == 0, result.output
     return json.loads(result.stdout)
+
+
+def test_an_installation_without_the_extra_is_told_which_one_to_install() -> None:
+    script = (
+        "import sys\n"
+        "sys.modules |= dict.fromkeys(['typer', 'rich', 'rich.console', 'xarray', 'sympy', 'matplotlib'])\n"
+        "from lean_yaw_env.cli import main\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script, "gait"], capture_output=True, text=True)
+    assert done.returncode == 1
+    hint = "lean-yaw: typer is not installed, run `pip install 'lean-yaw-env[analysis]'`"
+    assert done.stderr.strip() == hint
 
 
 @pytest.mark.parametrize("command", COMMANDS)

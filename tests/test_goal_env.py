@@ -9,11 +9,12 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import SyncVectorEnv
 from stable_baselines3 import SAC, HerReplayBuffer
 from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 import lean_yaw_env  # noqa: F401  registers the environments
-from lean_yaw_env.envs.goal_env import GOAL_SCALE, WaypointGoalEnv
+from lean_yaw_env.envs.goal_env import GOAL_SCALE, WaypointGoalEnv, WaypointGoalVectorEnv
 from lean_yaw_env.envs.tasks.waypoint import RADIUS
 from lean_yaw_env.registration import GOAL_ENV_ID
 
@@ -55,8 +56,8 @@ def test_the_observation_knows_nothing_of_the_goal() -> None:
     first, _ = env.reset(seed=0, options={"goal": (10.0, 3.0)})
     other, _ = env.reset(seed=0, options={"goal": (-5.0, 8.0)})
     assert np.array_equal(first["observation"], other["observation"])
-    np.testing.assert_array_equal(first["desired_goal"], np.float32([1.25, 0.375]))
-    np.testing.assert_array_equal(other["desired_goal"], np.float32([-0.625, 1.0]))
+    np.testing.assert_array_equal(first["desired_goal"], [1.25, 0.375])
+    np.testing.assert_array_equal(other["desired_goal"], [-0.625, 1.0])
 
 
 def test_a_fall_is_no_success() -> None:
@@ -65,7 +66,52 @@ def test_a_fall_is_no_success() -> None:
     _, reward, terminated, _, info = env.step(ZERO)
     assert terminated
     assert reward == 0.0
-    assert info["is_success"] is False
+    assert info["is_success"] == 0.0
+
+
+@pytest.mark.parametrize("far", [80.0, 200.0, 1000.0])
+def test_goals_far_away_are_themselves(far: float) -> None:
+    env = WaypointGoalEnv(start_disturbance=0.0)
+    observation, _ = env.reset(seed=0, options={"goal": (far, 0.0)})
+    assert observation["desired_goal"][0] == far / GOAL_SCALE
+    assert env.observation_space.contains(observation)
+    # where all goals beyond 80 were taken for 80, the walker had reached them all there
+    env.simulation.walkers["place_x"] = 80.0
+    observation, reward, terminated, _, info = env.step(ZERO)
+    is_near = abs(8.0 * observation["achieved_goal"][0] - far) < RADIUS
+    assert (reward == 1.0) == terminated == (info["is_success"] == 1.0) == is_near == (far == 80.0)
+    ends = env.compute_terminated(observation["achieved_goal"], observation["desired_goal"], info)
+    assert ends == terminated
+
+
+def test_one_walker_and_many_agree_bit_for_bit() -> None:
+    many = gym.make_vec(GOAL_ENV_ID, num_envs=3, horizon=8.0)
+    singles = SyncVectorEnv([lambda: gym.make(GOAL_ENV_ID, horizon=8.0)] * 3)
+    assert isinstance(many.unwrapped, WaypointGoalVectorEnv)
+    assert many.observation_space == singles.observation_space
+    random = np.random.default_rng(1)
+    pairs = [(many.reset(seed=2), singles.reset(seed=2))]
+    for _ in range(30):
+        actions = random.uniform(-1.0, 1.0, (3, 2)).astype(np.float32)
+        pairs.append((many.step(actions), singles.step(actions)))
+    for ours, theirs in pairs:
+        for key in ("observation", "achieved_goal", "desired_goal"):
+            assert ours[0][key].dtype == theirs[0][key].dtype
+            assert (ours[0][key] == theirs[0][key]).all()
+        assert ours[-1].keys() == theirs[-1].keys()
+        assert all((ours[-1][key] == theirs[-1][key]).all() for key in ours[-1])
+        for a, b in zip(ours[1:-1], theirs[1:-1], strict=True):
+            assert (a == b).all()
+
+
+def test_a_copied_episode_goes_on() -> None:
+    env = WaypointGoalEnv(sensor_noise=0.1)
+    env.reset(seed=3)
+    other = pickle.loads(pickle.dumps(env))
+    for _ in range(20):
+        a, b = env.step(ZERO), other.step(ZERO)
+        assert all((a[0][key] == b[0][key]).all() for key in a[0])
+        assert a[1:4] == b[1:4]
 
 
 def test_it_pickles_and_takes_the_options_of_the_others() -> None:

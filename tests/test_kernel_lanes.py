@@ -68,7 +68,7 @@ def test_machine_code_depends_on_formulas_generated_or_held_by_a_function_around
 
     def digest(factor: float, size: int) -> str:
         formula = generated(f"def formula(x):\n    return {factor!r} * x")
-        return compilation._digest(entry_around(formula, size))
+        return compilation._digest(entry_around(formula, size), ())
 
     assert digest(2.0, 1) == digest(2.0, 1)
     assert digest(2.0, 1) != digest(3.0, 1)

@@ -11,7 +11,9 @@ import pytest
 from scipy.optimize import brentq
 
 from lean_yaw_env import LimitCycle, NoGaitError, Walker, WalkerParameters, find_limit_cycle
-from lean_yaw_env.analysis.limit_cycle import find_gait, planar_gait_rate
+from lean_yaw_env.analysis import ActiveMap, find_gait, planar_gait_rate
+from lean_yaw_env.analysis.fixed_point import solve_fixed_point
+from lean_yaw_env.analysis.path import axle_middle
 from lean_yaw_env.analysis.stride import stride_jacobian, stride_map
 from lean_yaw_env.errors import FellError
 from lean_yaw_env.parameters import MIRROR, Vector
@@ -94,6 +96,53 @@ def test_without_hip_width_the_gait_is_the_planar_closed_form(radius: float, slo
 
 def test_the_two_searches_agree(cycle: LimitCycle) -> None:
     assert np.abs(find_gait(Walker()) - cycle.state).max() < 1e-10
+
+
+def test_turns_to_either_side_are_mirror_images() -> None:
+    walker = Walker(WalkerParameters(slope_turns=True))
+    right, left = (find_limit_cycle(walker, mass_offset=offset) for offset in (0.05, -0.05))
+    assert left.turn == pytest.approx(-right.turn, abs=1e-11)
+    for name in ("speed", "step_length", "gravity_work", "turning_radius", "stride_period"):
+        assert getattr(left, name) == pytest.approx(getattr(right, name), rel=1e-10)
+    # the two feet walk on circles that lie a hip width apart, so that the mean of both counts
+    chords = [
+        float(np.linalg.norm(first.displacement + second.displacement))
+        for first, second in (stride_map(walker, g.state, mass_offset=m) for g, m in ((right, 0.05), (left, -0.05)))
+    ]  # fmt: skip
+    assert abs(chords[0] - chords[1]) > 0.03 * chords[0]
+    assert right.step_length == pytest.approx(0.25 * sum(chords), rel=1e-10)
+
+
+def test_the_middle_of_the_axle_turns_about_one_centre_at_the_turning_radius() -> None:
+    walker = Walker(WalkerParameters(slope_turns=True))
+    gait = find_limit_cycle(walker, mass_offset=0.05)
+    walk = walker.walk(60, state=gait.state, mass_offset=0.05)
+    places = walk.footprints + [
+        axle_middle(walker, state, foot)
+        for state, foot in zip(walk.states, walk.stances, strict=True)
+    ]
+    # the circle through three left steps' places, and the one through three right steps'
+    radii = [_circle_through(*places[first::20][:3]) for first in (0, 1)]
+    assert gait.turning_radius == pytest.approx(np.mean(radii), rel=1e-5)
+    assert find_limit_cycle(Walker()).turning_radius == math.inf
+
+
+def _circle_through(a: Vector, b: Vector, c: Vector) -> float:
+    """Its radius: product of the sides over four times the area."""
+    sides = [float(np.linalg.norm(p - q)) for p, q in ((a, b), (b, c), (c, a))]
+    (x1, z1), (x2, z2) = b - a, c - a
+    return math.prod(sides) / (2.0 * abs(x1 * z2 - x2 * z1))
+
+
+def test_of_two_gaits_that_meet_at_a_fold_it_is_the_one_that_the_planar_gait_leads_to() -> None:
+    walker = Walker(WalkerParameters(0.42, 0.77, 0.9, 0.0082))
+    found = find_limit_cycle(walker, inter_leg_angle=0.38)
+    wide = ActiveMap(walker, 0.38, n_steps=1)
+    state = np.array([0.0, 0.19, 0.0, planar_gait_rate(walker, 0.38), 0.0])
+    for share in np.linspace(0.0, 1.0, 101):
+        state = solve_fixed_point(wide.moved("hip_width", 0.42 * share), state)
+    assert found.state == pytest.approx(state, abs=1e-10)
+    assert found.is_stable
 
 
 # --- published numbers

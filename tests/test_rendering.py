@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.error import DependencyNotInstalled
@@ -30,6 +31,7 @@ from lean_yaw_env.rendering import (
 from lean_yaw_env.rendering.camera import Panel, body_camera, floor_camera, upward
 from lean_yaw_env.rendering.footprints import footprint_length, footprint_outlines
 from lean_yaw_env.rendering.palette import COMMAND, FOOT_COLOURS, GOAL, INK, LEFT, REFERENCE, RIGHT
+from lean_yaw_env.rendering.picture import footprint_figure
 from lean_yaw_env.walker import Walker
 
 # Table 2's gait (left stance) to the digits that a root finder gives
@@ -410,6 +412,25 @@ def test_extreme_walkers_in_fallen_poses_are_drawn(renderer, parameters):
     assert len(coloured(frame, RIGHT)) > 50
 
 
+@pytest.mark.parametrize("right", [-4.0, 0.0, 4.0])
+def test_the_words_never_hide_the_walker(walker, renderer, right):
+    lines = status_lines(step=132, time=80.0, speed=0.4, heading=0.3, commanded_heading=0.5)
+    place = np.array([6.0, right])
+    goals = [Goal(0.0, -right, 0.5), Goal(0.0, 5.0, 0.5)]
+
+    def frame_with(lines):
+        pose = Pose(GAIT, contact=place)
+        path = np.array([[0.0, 0.0], place])
+        return renderer.frame(Scene(walker.parameters, pose, path=path, goals=goals, lines=lines))
+
+    words = np.any(frame_with(lines) != frame_with(()), axis=-1)
+    masses = coloured(frame_with(()), INK)
+    # The masses and the heading's arrow are what is dark in the view from above, without the scale's bar
+    body = masses[(masses[:, 1] < 560) & (masses[:, 0] < 480)]
+    assert words.any() and len(body) > 100
+    assert not words[body[:, 0], body[:, 1]].any()
+
+
 def test_an_array_needs_no_display_and_opens_none():
     script = (
         "import numpy as np, sys\n"
@@ -467,6 +488,18 @@ def test_without_a_display_a_window_says_so(walker, monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "no such driver")
     with pytest.raises(RuntimeError, match="no window could be opened"):
         Renderer().show(scene_of(walker, 1))
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere there is a display")
+def test_without_a_display_no_invisible_window_opens(monkeypatch):
+    import pygame
+
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
+        monkeypatch.delenv(name, raising=False)
+    env = gym.make("LeanYaw/Walk-v0", render_mode="human")
+    with pytest.raises(RuntimeError, match="there is no display"):
+        env.reset(seed=0)
+    assert not pygame.display.get_init()
 
 
 # Films
@@ -623,6 +656,25 @@ def test_footprints_of_several_walks_share_one_scale(walker):
         np.testing.assert_array_equal(path.get_ydata(), walk.path[:, 1])
 
 
+@pytest.mark.parametrize("count", [1, 5, 7])
+def test_titles_and_labels_of_footprints_are_inside_the_picture(walker, count):
+    walks = {f"walk {k}": walker.walk(60, state=GAIT) for k in range(count)}
+    figure, panels = footprint_figure(walks, places=[(12.0, -3.0)])
+    figure.canvas.draw()
+    columns = 4 if count == 7 else count
+    for k, panel in enumerate(panels):
+        assert panel.get_title() == f"walk {k}"
+        shown = [panel.title]
+        shown += [panel.xaxis.label] if k + columns >= count else []
+        shown += [panel.yaxis.label] if k % columns == 0 else []
+        for text in shown:
+            box = text.get_window_extent()
+            assert text.get_visible() and text.get_text()
+            assert figure.bbox.containsx(box.x0) and figure.bbox.containsx(box.x1)
+            assert figure.bbox.containsy(box.y0) and figure.bbox.containsy(box.y1)
+        assert panel.get_xlim()[0] < -3.0
+
+
 def test_a_picture_of_footprints_is_written_whole(walker, tmp_path):
     walks = {"fixed": walker.walk(3, state=GAIT)}
     save_footprints(walks, tmp_path / "prints.png")
@@ -718,9 +770,12 @@ def test_pictures_of_footprints_refuse_what_they_cannot_draw(walker, tmp_path):
     ("module", "draw"),
     [
         ("pygame", lambda folder: Renderer()),
-        ("matplotlib", lambda folder: draw_walker(WalkerParameters(), folder / "walker.png")),
+        (
+            "matplotlib.figure",
+            lambda folder: draw_walker(WalkerParameters(), folder / "walker.png"),
+        ),
         ("imageio_ffmpeg", lambda folder: film(Walker(), 1, folder / "walk.mp4", state=GAIT)),
-        ("PIL.Image", lambda folder: film(Walker(), 1, folder / "walk.gif", state=GAIT)),
+        ("PIL", lambda folder: film(Walker(), 1, folder / "walk.gif", state=GAIT)),
         ("tqdm", lambda folder: film(Walker(), 1, folder / "walk.mp4", state=GAIT)),
     ],
 )

@@ -1,4 +1,14 @@
-"""A family of gaits over inter-leg angle and heading, driven by the slope or by pumping, with the step map linearised about each."""
+"""A family of gaits over inter-leg angle and heading, driven by the slope or by pumping, with the step map linearised about each.
+
+A right stance is taken as its mirror image, so that walking straight is one map repeated, z' = A z + B v, with
+
+    z = (section state, mass offset in force) less the gait's,
+    v = (inter-leg angle, change of the offset) less the gait's.
+
+A heading phi off downhill is held by the offset of the closed form, sin(phi) = -offset / tan(slope); its mirror image is the gait of -phi,
+so that the two alternate. A gait that pumps has the masses on alternate sides: its own change of the offset is part of it, and v is what is
+added.
+"""
 
 from __future__ import annotations
 
@@ -11,17 +21,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import root
 
-from agents.controllers.regulator import LinearStep, linearise_step
 from lean_yaw_env.analysis.fixed_point import RESIDUAL_LIMIT, solve_fixed_point
-from lean_yaw_env.analysis.section_map import ActiveMap
+from lean_yaw_env.analysis.active_map import ActiveMap, has_downhill
+from lean_yaw_env.analysis.path import distance_walked
+from lean_yaw_env.analysis.stride import StepDerivatives, differentiate_step
+from lean_yaw_env.envs.formulas import advance
 from lean_yaw_env.envs.options import gait_of
 from lean_yaw_env.errors import LeanYawError, NoGaitError
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector, WalkerParameters, require_number
+from lean_yaw_env.kernel.jacobian import OUTPUTS
+from lean_yaw_env.kernel.records import Command
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, MIRROR, STATE_SIZE, Vector, WalkerParameters
+from lean_yaw_env.validation import require_number
 from lean_yaw_env.walker import Walker
 
 ANGLES = tuple(np.linspace(0.15, 0.45, 13).tolist())
 DOWNHILL_HEADINGS = tuple(np.linspace(-0.7, 0.7, 9).tolist())
 ALL_HEADINGS = tuple(np.linspace(-math.pi, math.pi, 17).tolist())
+SIZE = STATE_SIZE + 1
+"""Of the regulated state: the section state and the mass offset in force."""
+_TINY = 1e-30
 
 
 @dataclass(frozen=True)
@@ -51,6 +69,63 @@ class Pumping:
 
 
 @dataclass(frozen=True)
+class LinearStep:
+    """The mirrored step map about a state on the left foot.
+
+    Attributes
+    ----------
+    by_state : shape (6, 6)
+    by_input : shape (6, 2)
+    speed : shape (8,)
+        How the step's speed along the mean heading of its two footprints follows from state and inputs.
+    """
+
+    by_state: Vector
+    by_input: Vector
+    speed: Vector
+
+
+def linearise_step(
+    walker: Walker,
+    state: Vector,
+    inter_leg_angle: float,
+    mass_offset: float,
+    previous_offset: float | None = None,
+) -> LinearStep:
+    """Linearise the mirrored step from a left-stance section state (5,), the masses going from ``previous_offset`` to ``mass_offset``.
+
+    Without a previous offset they are held. The derivatives are exact: those of ``differentiate_step``.
+
+    Raises
+    ------
+    FellError
+        If the walker does not complete the step.
+    """
+    before = mass_offset if previous_offset is None else previous_offset
+    step = differentiate_step(walker, state, "left", Command(inter_leg_angle, mass_offset, before))
+    by_state, by_input = np.zeros((SIZE, SIZE)), np.zeros((SIZE, 2))
+    by_state[:STATE_SIZE, :STATE_SIZE] = MIRROR[:, None] * step.by_state
+    by_state[:STATE_SIZE, -1] = MIRROR * (step.by_mass_offset + step.by_previous_offset)
+    by_input[:STATE_SIZE, 0] = MIRROR * step.by_inter_leg_angle
+    by_input[:STATE_SIZE, 1] = MIRROR * step.by_mass_offset
+    # the masses arrive at old offset + change within the step, and the mirror turns their side round
+    by_state[-1, -1] = by_input[-1, 1] = -1.0
+    gradient = _speed_gradient(state, step)
+    by_angle, by_offset, by_before = gradient[STATE_SIZE:]
+    speed = np.array([*gradient[:STATE_SIZE], by_offset + by_before, by_angle, by_offset])
+    return LinearStep(by_state, by_input, speed)
+
+
+def _speed_gradient(state: Vector, step: StepDerivatives) -> Vector:
+    """A step's speed along its mean heading by the inputs of its Jacobian, shape (8,): the imaginary part of numbers that carry derivatives."""
+    carrying = step.outputs[:, None] + 1j * _TINY * step.jacobian
+    named = dict(zip(OUTPUTS, carrying, strict=True))
+    before = state[0] + 1j * _TINY * np.eye(1, step.jacobian.shape[1])[0]
+    along = advance(named["displacement_x"], named["displacement_z"], 0.5 * (before + named["heading"]))
+    return (along / named["duration"]).imag / _TINY
+
+
+@dataclass(frozen=True)
 class GaitNode:
     """A gait on the left foot, and the step map about it.
 
@@ -73,11 +148,6 @@ class GaitNode:
     pumping: float
     speed: float
     step: LinearStep
-
-
-def has_downhill(parameters: WalkerParameters) -> bool:
-    """Whether headings differ: not on the level, nor where the slope turns with the walker."""
-    return parameters.slope != 0.0 and not parameters.slope_turns
 
 
 def headings_of(parameters: WalkerParameters, pumping: Pumping) -> tuple[float, ...]:
@@ -153,7 +223,7 @@ class _GaitGrid:
         else:
             state = solve_fixed_point(two_steps, start)
         first, second = two_steps.results(state)
-        chord = float(np.linalg.norm(first.displacement + second.displacement))
+        distance = float(distance_walked([first.displacement, second.displacement]))
         left, right = two_steps.mass_offset
         apart = state.copy()
         apart[0] = 0.5 * (state[0] - first.state[0])
@@ -162,7 +232,7 @@ class _GaitGrid:
             state=apart,
             held_offset=0.5 * (left + right),
             pumping=aside,
-            speed=chord / (first.duration + second.duration),
+            speed=distance / (first.duration + second.duration),
             step=linearise_step(self._walker, state, angle, left, right),
         )
 

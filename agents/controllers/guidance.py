@@ -8,13 +8,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.agent import State
-from agents.controllers.lqr import HeadingLqr, LqrLoop, LqrSettings, UprightLqr
-from agents.controllers.tuned import tuned
-from agents.observations import ObservationLayout
+from lean_yaw_env.envs.observation import OFFSET_SCALE
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.envs.transition import OFFSET_SCALE
 from lean_yaw_env.parameters import Vector
+from lean_yaw_env.validation import require_number
+
+from ..agent import State
+from ..observations import ObservationLayout
+from ..settings import tuned
+from .lqr import HeadingLqr, LqrLoop, LqrSettings, UprightLqr
 
 _PREVIEW = "preview_"
 
@@ -37,10 +39,8 @@ class PathSettings:
     loop: LqrSettings = field(default_factory=LqrSettings)
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.ahead <= 8.0:
-            raise ValueError(f"ahead must be in [0, 8], not {self.ahead!r}")
-        if not 0.0 < self.approach < math.inf:
-            raise ValueError(f"approach must be in (0, inf), not {self.approach!r}")
+        require_number("ahead", self.ahead, 0.0, 8.0)
+        require_number("approach", self.approach, 0.0, math.inf, "()")
 
 
 class PathGuidance:
@@ -64,6 +64,8 @@ class PathGuidance:
         If the walker has no gait down its slope.
     """
 
+    Settings = PathSettings
+
     def __init__(
         self,
         task: str = "Slalom",
@@ -71,7 +73,7 @@ class PathGuidance:
         settings: PathSettings | None = None,
     ) -> None:
         chosen = EnvOptions() if options is None else options
-        _require(task, chosen, ("cross_track_error", "path_heading_error"))
+        ObservationLayout.of(task, chosen, needs=("cross_track_error", "path_heading_error"))
         self._settings = tuned("lqr", task, PathSettings()) if settings is None else settings
         self._loop = LqrLoop(task, chosen, self._settings.loop)
         names = [name for name in self._loop.layout.names if name.startswith(_PREVIEW)]
@@ -139,10 +141,8 @@ class WaypointSettings:
     loop: LqrSettings = field(default_factory=LqrSettings)
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.radius < math.inf:
-            raise ValueError(f"radius must be in [0, inf), not {self.radius!r}")
-        if not 0.0 <= self.persistence <= math.pi:
-            raise ValueError(f"persistence must be in [0, pi], not {self.persistence!r}")
+        require_number("radius", self.radius, 0.0, math.inf, "[)")
+        require_number("persistence", self.persistence, 0.0, math.pi)
 
 
 class WaypointGuidance:
@@ -164,6 +164,8 @@ class WaypointGuidance:
         If the walker has no gait down its slope.
     """
 
+    Settings = WaypointSettings
+
     def __init__(
         self,
         task: str = "Waypoint",
@@ -171,7 +173,7 @@ class WaypointGuidance:
         settings: WaypointSettings | None = None,
     ) -> None:
         chosen = EnvOptions() if options is None else options
-        _require(task, chosen, ("goal_bearing", "goal_distance"))
+        ObservationLayout.of(task, chosen, needs=("goal_bearing", "goal_distance"))
         self._settings = tuned("lqr", task, WaypointSettings()) if settings is None else settings
         self._loop = LqrLoop(task, chosen, self._settings.loop)
 
@@ -200,35 +202,30 @@ class WaypointGuidance:
         return preferred + _wrapped(bearing - preferred)
 
 
-def _require(task: str, options: EnvOptions, needs: tuple[str, ...]) -> None:
-    names = ObservationLayout.of(task, options).names
-    for name in needs:
-        if name not in names:
-            raise ValueError(
-                f"task must show {name} to be guided by, but {task!r} shows {', '.join(names)}"
-            )
-
-
 def _wrapped(angle: Vector) -> Vector:
     """An angle's equal within half a turn."""
     return angle - 2.0 * math.pi * np.round(angle / (2.0 * math.pi))
 
 
-def guided(
-    task: str, options: EnvOptions
-) -> HeadingLqr | PathGuidance | UprightLqr | WaypointGuidance:
-    """The regulator with the guidance that a task's observations call for.
+Regulator = HeadingLqr | PathGuidance | UprightLqr | WaypointGuidance
+
+
+def regulator_for(task: str, options: EnvOptions) -> type[Regulator]:
+    """The regulator, with the guidance that a task's observations call for; made of task, options and settings."""
+    names = ObservationLayout.of(task, options).names
+    if "goal_bearing" in names:
+        return WaypointGuidance
+    if "cross_track_error" in names:
+        return PathGuidance
+    return HeadingLqr if "heading_error" in names else UprightLqr
+
+
+def guided(task: str, options: EnvOptions) -> Regulator:
+    """The regulator for a task with the settings that come with the package.
 
     Raises
     ------
     NoGaitError
         If the walker has no gait to regulate about.
     """
-    names = ObservationLayout.of(task, options).names
-    if "goal_bearing" in names:
-        return WaypointGuidance(task, options)
-    if "cross_track_error" in names:
-        return PathGuidance(task, options)
-    if "heading_error" in names:
-        return HeadingLqr(task, options)
-    return UprightLqr(task, options)
+    return regulator_for(task, options)(task, options)

@@ -8,15 +8,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.agent import State
-from agents.controllers.gaits import ANGLES, Pumping
-from agents.controllers.regulator import LqrWeights
-from agents.controllers.schedule import Scheduled, schedule_of
-from agents.controllers.tuned import tuned
-from agents.observations import ObservationLayout
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, MIRROR, STATE_FIELDS, Vector
+from lean_yaw_env.validation import require_number
+
+from ..agent import State
+from ..observations import ObservationLayout
+from ..settings import tuned
+from .gaits import ANGLES, Pumping
+from .schedule import LqrWeights, Scheduled, schedule_of
 
 
 @dataclass(frozen=True)
@@ -47,12 +48,10 @@ class LqrSettings:
     def __post_init__(self) -> None:
         for name in ("inter_leg_angle", "turning_angle"):
             value = getattr(self, name)
-            if value is not None and not ANGLES[0] <= value <= ANGLES[-1]:
-                raise ValueError(f"{name} must be in [{ANGLES[0]}, {ANGLES[-1]}], not {value!r}")
+            if value is not None:
+                require_number(name, value, ANGLES[0], ANGLES[-1])
         for name in ("turning_error", "largest_error"):
-            value = getattr(self, name)
-            if not 0.0 < value <= math.pi:
-                raise ValueError(f"{name} must be in (0, pi], not {value!r}")
+            require_number(name, getattr(self, name), 0.0, math.pi, "(]")
 
 
 class LqrLoop:
@@ -187,6 +186,8 @@ class HeadingLqr:
         If the walker has no gait down its slope.
     """
 
+    Settings = LqrSettings
+
     def __init__(
         self,
         task: str = "Heading",
@@ -194,11 +195,7 @@ class HeadingLqr:
         settings: LqrSettings | None = None,
     ) -> None:
         chosen = EnvOptions() if options is None else options
-        names = ObservationLayout.of(task, chosen).names
-        if "heading_error" not in names:
-            raise ValueError(
-                f"task must show heading_error for feedback on it, but {task!r} shows {', '.join(names)}"
-            )
+        names = ObservationLayout.of(task, chosen, needs=("heading_error",)).names
         self._has_speed = "commanded_speed" in names
         self.loop = LqrLoop(
             task, chosen, tuned("lqr", task, LqrSettings()) if settings is None else settings
@@ -233,6 +230,8 @@ class UprightLqr:
     NoGaitError
         If the walker has no gait to regulate about.
     """
+
+    Settings = LqrSettings
 
     def __init__(
         self,

@@ -1,16 +1,16 @@
-"""Settings of the predictive controller, and those kept for each task."""
+"""Settings of the predictive controller."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
-from lean_yaw_env.parameters import require_number
+from lean_yaw_env.validation import require_count, require_number
 
 
 @dataclass(frozen=True)
-class Spread:
+class PlanSpread:
     """First standard deviations of what is tried, as shares of the actions' ranges.
 
     Attributes
@@ -28,7 +28,7 @@ class Spread:
         for name, value in vars(self).items():
             require_number(f"spread {name}", value, 0.0, 2.0)
         if self.angle == self.steady == self.alternating == 0.0:
-            raise ValueError("spread must be above 0 in one direction or more, not 0 in all")
+            raise ValueError("spread must be above 0 in one direction or more, got 0 in all")
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class MpcSettings:
         Where what is tried is drawn; linear in between and held after the last.
     samples, iterations, elites : int
         Plans tried at once, how often, and of how many best ones the next are made.
-    spread : Spread
+    spread : PlanSpread
     window : time
         In which plans are compared; one that ends earlier goes on at the reward rate of its last two steps.
     fall : reward
@@ -69,7 +69,7 @@ class MpcSettings:
     samples: int = 48
     iterations: int = 3
     elites: int = 8
-    spread: Spread = field(default_factory=Spread)
+    spread: PlanSpread = field(default_factory=PlanSpread)
     window: float = 20.0
     fall: float = 50.0
     step_price: float = 0.0
@@ -87,46 +87,14 @@ class MpcSettings:
             ("elites", 2, self.samples - 2),
             ("scenarios", 0, 64),
         ):
-            value = getattr(self, name)
-            if not isinstance(value, int) or not low <= value <= high:
-                raise ValueError(f"{name} must be a whole number in [{low}, {high}], not {value!r}")
+            require_count(name, getattr(self, name), low, high)
         knots = self.knots
         rises = all(a < b for a, b in itertools.pairwise(knots))
         if not knots or knots[0] != 0 or not rises or knots[-1] >= self.horizon:
             raise ValueError(
-                f"knots must increase from 0 to below the horizon {self.horizon}, not {knots!r}"
+                f"knots must increase from 0 to below the horizon {self.horizon}, got {knots!r}"
             )
         require_number("window", self.window, 0.0, math.inf, "()")
-        require_number("fall", self.fall, 0.0, math.inf, "[)")
-        require_number("step_price", self.step_price, 0.0, math.inf, "[)")
-        require_number("trust", self.trust, 0.0, math.inf, "[)")
-        require_number("margin", self.margin, 0.0, math.inf, "[)")
+        for name in ("fall", "step_price", "trust", "margin"):
+            require_number(name, getattr(self, name), 0.0, math.inf, "[)")
         require_number("push_scale", self.push_scale, 0.0, 10.0)
-
-
-# Uphill, or on the level, a fall is decided long before it comes: plans are followed until the regulator has the walker in its gait again
-_PUMPING = MpcSettings(
-    horizon=6, tail=16, knots=(0, 2, 4), samples=24, iterations=2, elites=5,
-    spread=Spread(0.15, 0.2, 0.2), window=25.0, trust=1.0,
-)  # fmt: skip
-
-SETTINGS: dict[str, MpcSettings] = {
-    "Heading": MpcSettings(step_price=0.05),
-    "SpeedHeading": MpcSettings(step_price=0.05, window=12.0),
-    "Slalom": MpcSettings(),
-    "Waypoint": MpcSettings(),
-    "Walk": MpcSettings(samples=16, iterations=1, elites=4),
-    # No better than the regulator: falls are rare, and few scenarios show one. Twice as many, with larger pushes, were better at push level
-    # 0.8 and no better at 0.5
-    "Push": MpcSettings(
-        horizon=1, tail=6, knots=(0,), samples=12, iterations=1, elites=4,
-        spread=Spread(0.3, 0.0, 0.3), trust=1.0, scenarios=16, push_scale=1.5,
-    ),
-    "UTurn": _PUMPING,
-    # Commands run out on the way. A plan that ended there was paid for anything, and one walker of six fell; drawn commands see it further
-    "Level": replace(
-        _PUMPING, horizon=4, tail=18, knots=(0, 2), samples=16, iterations=1, elites=4, scenarios=4,
-        margin=0.5,
-    ),
-}  # fmt: skip
-"""By task: chosen by hand among a few, by the return over 6 to 40 episodes kept for tuning; ``tune_mpc`` seeks further."""

@@ -1,29 +1,137 @@
-"""Gains scheduled over a family of gaits: optimal about each, linear between."""
+"""Optimal linear feedback (LQR) on the exact step map, scheduled over a family of gaits: optimal about each, linear between.
+
+With the offset in the state and its change as the input (see ``gaits``), the limit on the change is part of what is optimised: asking for
+more costs more. A gait off downhill alternates with its mirror image, and the optimal gains are periodic, of period two.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_discrete_are
 
-from agents.controllers.gaits import (
+from lean_yaw_env.kernel.compilation import entry_point
+from lean_yaw_env.parameters import STATE_SIZE, Vector, WalkerParameters
+from lean_yaw_env.validation import require_number
+
+from .gaits import (
     ANGLES,
+    SIZE,
     GaitNode,
+    LinearStep,
     Pumping,
     gait_nodes,
     has_downhill,
     headings_of,
 )
-from agents.controllers.regulator import SIZE, LqrWeights, last_turn, periodic_gains
-from lean_yaw_env.kernel.compilation import entry_point
-from lean_yaw_env.parameters import STATE_SIZE, Vector, WalkerParameters
 
 _SCALARS = STATE_SIZE  # first column after the state
 _GAIN = _SCALARS + 4
 _TURN = _GAIN + 2 * SIZE
+_PRIOR = (0.01, 0.03, 0.05, 0.08, 0.03)
+"""How far states stray from the gait, heading apart; weighs what the last step's turn is estimated from."""
+
+
+@dataclass(frozen=True)
+class LqrWeights:
+    """Deviations that cost as much as one another; infinite ones cost nothing.
+
+    Attributes
+    ----------
+    heading, ankle_angle : rad
+    stance_pitch_rate, ankle_rate : rad / time unit
+    mass_offset, offset_change : leg lengths
+    inter_leg_angle : rad
+    speed : leg lengths / time unit
+        Of the step, which the state does not hold: a cost of state and inputs together.
+    """
+
+    heading: float = 0.08
+    ankle_angle: float = 0.8
+    stance_pitch_rate: float = 2.6
+    ankle_rate: float = 0.22
+    mass_offset: float = math.inf
+    inter_leg_angle: float = 0.035
+    offset_change: float = 0.016
+    speed: float = math.inf
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            needed = name in ("heading", "inter_leg_angle", "offset_change")  # by the feedback
+            require_number(name, value, 0.0, math.inf, "()" if needed else "(]")
+
+    def matrices(self) -> tuple[Vector, Vector]:
+        """Costs of the state (6, 6) and of the inputs (2, 2)."""
+        scales = np.array(
+            [self.heading, math.inf, self.ankle_angle, self.stance_pitch_rate, self.ankle_rate, self.mass_offset]
+        )  # fmt: skip
+        inputs = np.array([self.inter_leg_angle, self.offset_change])
+        return np.diag(scales**-2), np.diag(inputs**-2)
+
+
+def periodic_gains(now: LinearStep, then: LinearStep, weights: LqrWeights) -> tuple[Vector, Vector]:
+    """The optimal gains (2, 6), input = -gain z, for ``now`` and for ``then`` where the two steps alternate for ever.
+
+    The Riccati equation is that of two steps at once; its solution is the cost to go before ``now``, and the one before ``then`` follows
+    by one step of the recursion.
+    """
+    first, second = _costs(now, weights), _costs(then, weights)
+    a, b = now.by_state, now.by_input
+    both = then.by_state @ a
+    by_both = np.hstack([then.by_state @ b, then.by_input])
+    state_cost = first.state + a.T @ second.state @ a
+    cross = np.hstack([first.cross + a.T @ second.state @ b, a.T @ second.cross])
+    mixed = b.T @ second.cross
+    input_cost = np.block([[first.input + b.T @ second.state @ b, mixed], [mixed.T, second.input]])
+    cost_to_go = solve_discrete_are(both, by_both, state_cost, input_cost, s=cross)
+    gain = _gain(then, cost_to_go, second)
+    a, b = then.by_state, then.by_input
+    before_then = second.state + a.T @ cost_to_go @ (a - b @ gain) - second.cross @ gain
+    return _gain(now, 0.5 * (before_then + before_then.T), first), gain
+
+
+class _Costs(NamedTuple):
+    """z' state z + 2 z' cross v + v' input v."""
+
+    state: Vector
+    cross: Vector
+    input: Vector
+
+
+def _costs(step: LinearStep, weights: LqrWeights) -> _Costs:
+    state, inputs = weights.matrices()
+    by_state, by_input = step.speed[:SIZE] / weights.speed, step.speed[SIZE:] / weights.speed
+    return _Costs(
+        state + np.outer(by_state, by_state),
+        np.outer(by_state, by_input),
+        inputs + np.outer(by_input, by_input),
+    )
+
+
+def _gain(step: LinearStep, cost_to_go: Vector, costs: _Costs) -> Vector:
+    weighed = step.by_input.T @ cost_to_go
+    return np.linalg.solve(
+        costs.input + weighed @ step.by_input, weighed @ step.by_state + costs.cross.T
+    )
+
+
+def last_turn(before: LinearStep, weights: LqrWeights) -> Vector:
+    """What (5,) times (state without heading, offset) best estimates how far the last step turned.
+
+    Feedback is on the heading of the last footprint, tasks show the error of the mean of two. The last step's heading change follows
+    from what the step before started with, of which as much is left in the state as the map tells: the Gaussian estimate.
+    """
+    spread = np.array([*_PRIOR, 0.5 * weights.inter_leg_angle, weights.offset_change])
+    ways = np.hstack([before.by_state[:, 1:], before.by_input]) * spread
+    turned, seen = ways[0], ways[1:]
+    floor = 1e-6 * np.diag(np.square(_PRIOR))
+    return np.linalg.solve(seen @ seen.T + floor, seen @ turned)
 
 
 @entry_point()

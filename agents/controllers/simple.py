@@ -1,12 +1,29 @@
-"""Controllers that need no model of the walker: the paper's, which never acts, and one that acts at random."""
+"""Controllers that need no linear model: the paper's, which never acts; one that acts at random; and proportional-derivative feedback."""
 
 from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.agent import State
-from lean_yaw_env.envs.options import ACTION_SIZE
+from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, gait_of
+from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.parameters import STATE_FIELDS, Vector
+from lean_yaw_env.validation import require_finite
+
+from ..agent import State
+from ..observations import ObservationLayout
+from ..settings import tuned
+from .gaits import Pumping, has_downhill
+
+_ERROR = "heading_error"
+_SPEED, _SPEED_ERROR = "commanded_speed", "speed_error"
+_ANKLE = [field.name for field in STATE_FIELDS].index("ankle_angle")
+_ANKLE_RATE = [field.name for field in STATE_FIELDS].index("ankle_rate")
+_MIDDLE_SPEED = 0.42
+"""Of the gait at the paper's inter-leg angle on the paper's slope."""
 
 
 class FixedController:
@@ -50,5 +67,125 @@ class RandomController:
 def _action_shape(observation: ArrayLike) -> tuple[int, ...]:
     shape = np.shape(observation)
     if not shape:
-        raise ValueError(f"observation must have shape (..., features), not {shape}")
+        raise ValueError(f"observation must have shape (..., features), got {shape}")
     return (*shape[:-1], ACTION_SIZE)
+
+
+@dataclass(frozen=True)
+class HeadingGains:
+    """Gains of ``HeadingFeedback``.
+
+    Attributes
+    ----------
+    proportional : mass offset per rad of heading error
+    ankle, ankle_rate : mass offset per rad, and per rad / time unit, of the ankle's deviation from the gait
+        The derivative: a walker turns as far as it leans, so its lean is the rate of its heading, observed without a delay.
+    feedforward : share of the offset that holds the commanded heading
+    inter_leg_angle : change of the inter-leg angle from 0.3, rad, held all the time
+        Longer steps are slower in time but lean, and so turn, faster.
+    speed : rad of inter-leg angle per commanded speed above 0.42
+    speed_error : rad of inter-leg angle per speed that is lacking
+    pumping : Pumping
+        Offsets away from the stance foot that drive the walker beside the slope.
+    """
+
+    proportional: float = 0.051
+    ankle: float = -0.056
+    ankle_rate: float = 0.0104
+    feedforward: float = 0.947
+    inter_leg_angle: float = 0.106
+    speed: float = 0.0
+    speed_error: float = 0.0
+    pumping: Pumping = field(default_factory=Pumping)
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            if entry.name != "pumping":
+                require_finite(entry.name, getattr(self, entry.name))
+
+
+class HeadingFeedback:
+    """Steers to the commanded heading by moving the masses; sets a commanded speed by the inter-leg angle.
+
+    The feedforward is the offset that holds a heading phi for good, sin(phi) = -mu / tan(slope); feedback is on the heading error
+    and, as its derivative, on the lean of the ankle. Where the slope does not drive the walker, pumping does.
+
+    Parameters
+    ----------
+    task : str
+        A task that shows a heading error.
+    options : EnvOptions
+        Those of the environment.
+    gains : HeadingGains, optional
+        Those tuned for the task otherwise.
+
+    Raises
+    ------
+    ValueError
+        If the task shows no heading error.
+    NoGaitError
+        If the walker has no gait to take the ankle's deviation from.
+    """
+
+    def __init__(
+        self,
+        task: str = "Heading",
+        options: EnvOptions | None = None,
+        gains: HeadingGains | None = None,
+    ) -> None:
+        self._options = EnvOptions() if options is None else options
+        self._layout = ObservationLayout.of(task, self._options, needs=(_ERROR,))
+        self._gains = tuned("feedback", task, HeadingGains()) if gains is None else gains
+        parameters = self._options.walker_parameters(task_named(task))
+        gait = gait_of(parameters, self._gains.pumping.downhill)
+        self._gait_ankle, self._gait_ankle_rate = gait[_ANKLE], gait[_ANKLE_RATE]
+        self._tangent = math.tan(parameters.slope)
+        self._has_downhill = has_downhill(parameters)
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: State = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.float32], State]:
+        """Actions of the law; see ``Agent.predict``. It remembers nothing and draws nothing."""
+        seen = self._layout.require(observation)
+        action = np.empty((*seen.shape[:-1], ACTION_SIZE), dtype=np.float32)
+        action[..., 0] = _share(self._angle_change(seen), self._options.inter_leg_angle_range)
+        action[..., 1] = _share(self._offset(seen), self._options.mass_offset_range)
+        return np.clip(action, -1.0, 1.0), None
+
+    def _angle_change(self, seen: NDArray[np.float32]) -> Vector:
+        """How far from 0.3 rad the inter-leg angle is to be."""
+        change = np.full(seen.shape[:-1], self._gains.inter_leg_angle)
+        if _SPEED in self._layout.names:
+            wanted = self._layout.quantity(seen, _SPEED)
+            lacking = self._layout.quantity(seen, _SPEED_ERROR)
+            change += self._gains.speed * (wanted - _MIDDLE_SPEED)
+            change += self._gains.speed_error * lacking
+        return change
+
+    def _offset(self, seen: NDArray[np.float32]) -> Vector:
+        """The mass offset to command, in the frame of the observation: mirrored where that is."""
+        layout, gains = self._layout, self._gains
+        error = layout.quantity(seen, _ERROR)
+        heading = layout.quantity(seen, "heading")
+        # in a mirrored observation the walker always stands on its left foot
+        side = 1.0 if self._options.mirror else layout.quantity(seen, "stance_foot")
+        ankle = layout.quantity(seen, "ankle_angle") - side * self._gait_ankle
+        ankle_rate = layout.quantity(seen, "ankle_rate") - side * self._gait_ankle_rate
+        holding = -self._tangent * np.sin(heading + error)
+        from_downhill = heading if self._has_downhill else np.zeros_like(heading)
+        return (
+            gains.feedforward * holding
+            - gains.proportional * error
+            + gains.ankle * ankle
+            + gains.ankle_rate * ankle_rate
+            + side * gains.pumping.along(from_downhill)
+        )
+
+
+def _share(value: Vector, reach: float) -> Vector:
+    """The action that means a value; none where actions mean nothing."""
+    return value / reach if reach > 0.0 else 0.0 * value

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,20 +14,29 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from agents.evaluation.closed_loop_gait import GROUPS
-from agents.evaluation.closed_loop_report import ClosedLoopReport
-from agents.evaluation.closed_loop_survival import LargestPushes
-from agents.registry import AGENTS
+from lean_yaw_env.analysis import LargestPushes
 from lean_yaw_env.analysis.many_walks import ENDINGS
-from lean_yaw_env.files import written_whole
-from lean_yaw_env.rendering.palette import INK, STRONG_GRID, unit_colour
-from lean_yaw_env.rendering.picture import new_figure
+from lean_yaw_env.rendering.figures import new_figure, save_figure
+from lean_yaw_env.rendering.palette import (
+    INK,
+    LIGHT_GREY,
+    SERIES_COLOURS,
+    STRONG_GRID,
+    Colour,
+    mixed,
+    unit_colour,
+)
+
+from ..registry import agent_colour
+from .closed_loop_report import ClosedLoopReport, share_survived
 
 _DPI = 110
-COLOURS = ("#5b6068", "#d66825", "#256eb2", "#168e68", "#be265c", "#8c6eb4", "#c99414", "#4aa3c7", "#7a4b2a", "#2b2d34")  # fmt: skip
-"""One for each agent, in the order of the registry: an agent keeps its colour from picture to picture."""
 _MARKERS = {"heading": "o", "lean": "^", "pitch": "s", "masses": "D"}
-_ENDING_COLOURS = ("#d8ecd9", "#256eb2", "#d66825", "#8d9197", "#be265c", "#8c6eb4", "#c99414", "#000000")  # fmt: skip
+_WHITE: Colour = (255, 255, 255)
+_ENDING_COLOURS = [
+    unit_colour(each) for each in (mixed(LIGHT_GREY, _WHITE, 0.5), *SERIES_COLOURS)
+]
+"""By ending, in the order of their codes: still walking, then the ways to fall."""
 _WORDS = {
     "ankle_angle": "ankle angle (rad)",
     "ankle_rate": "ankle rate (rad / time unit)",
@@ -44,8 +54,9 @@ def save_eigenvalues(reports: Sequence[ClosedLoopReport], path: Path) -> None:
     ladder.axhline(1.0, color=unit_colour(INK), linewidth=1.4)
     ladder.grid(axis="y", color=unit_colour(STRONG_GRID), linewidth=0.6)
     ladder.set_axisbelow(True)
-    for k, (colour, report) in enumerate(zip(_colours(reports), reports, strict=True)):
-        for mode in () if report.gait is None else report.gait.modes:
+    for k, report in enumerate(reports):
+        colour = agent_colour(report.agent)
+        for mode in report.modes:
             value = mode.eigenvalue
             style: dict[str, Any] = {
                 "marker": _MARKERS[mode.about], "markersize": 8, "linestyle": "", "markeredgecolor": colour, "alpha": 0.85,
@@ -61,7 +72,7 @@ def save_eigenvalues(reports: Sequence[ClosedLoopReport], path: Path) -> None:
     ladder.set_ylabel("magnitude")
     figure.suptitle(f"{reports[0].task}: eigenvalues of the closed loop's stride")
     figure.legend(handles=_mode_handles(reports), loc="outside right center", frameon=False)
-    _save(figure, path)
+    save_figure(figure, path, dpi=_DPI)
 
 
 def _draw_plane(axes: Axes) -> None:
@@ -80,12 +91,12 @@ def _draw_plane(axes: Axes) -> None:
 def _mode_handles(reports: Sequence[ClosedLoopReport]) -> list[Line2D]:
     """Agents by colour, then modes by shape."""
     handles = [
-        Line2D([], [], color=colour, marker="o", linestyle="", markersize=8, label=report.agent)
-        for colour, report in zip(_colours(reports), reports, strict=True)
+        Line2D([], [], color=agent_colour(report.agent), marker="o", linestyle="", markersize=8, label=report.agent)
+        for report in reports
     ]
     handles += [
-        Line2D([], [], color="0.25", marker=_MARKERS[group], linestyle="", markersize=7, label=f"mostly {group}")
-        for group in GROUPS
+        Line2D([], [], color="0.25", marker=marker, linestyle="", markersize=7, label=f"mostly {motion}")
+        for motion, marker in _MARKERS.items()
     ]  # fmt: skip
     hollow = Line2D([], [], color="0.25", marker="o", linestyle="", markersize=7, markerfacecolor="none", label="hollow: neutral")  # fmt: skip
     return [*handles, hollow]
@@ -101,17 +112,17 @@ def save_basins(reports: Sequence[ClosedLoopReport], path: Path) -> None:
     norm = BoundaryNorm(np.append(keys, keys[-1] + 1.0) - 0.5, len(keys))
     seen: set[float] = set()
     for column, report in enumerate(reports):
-        for row, basin in enumerate(report.basins):
+        for row, found in enumerate(report.basins):
+            x, y = found.ending.dims
+            centre = json.loads(found.attrs["centre"])
             place = axes[row, column]
-            place.pcolormesh(
-                basin.x_values, basin.y_values, basin.endings.T, cmap=colours, norm=norm
-            )
-            place.plot(*basin.centre, marker="+", color="black", markersize=9)
-            place.set_title(f"{report.agent}: {100.0 * basin.share:.0f} %", fontsize="medium")
-            place.set_xlabel(_WORDS[basin.x])
-            seen |= set(np.unique(basin.endings).tolist())
+            place.pcolormesh(found[x], found[y], found.ending.T, cmap=colours, norm=norm)
+            place.plot(centre[x], centre[y], marker="+", color="black", markersize=9)
+            place.set_title(f"{report.agent}: {100.0 * share_survived(found):.0f} %", fontsize="medium")
+            place.set_xlabel(_WORDS[x])
+            seen |= set(np.unique(found.ending).tolist())
             if column == 0:
-                place.set_ylabel(_WORDS[basin.y])
+                place.set_ylabel(_WORDS[y])
     figure.suptitle(f"{reports[0].task}: how a walk from each start ends, share survived")
     handles: list[Any] = [
         Patch(facecolor=_ENDING_COLOURS[k], edgecolor="black", linewidth=0.5, label=_ending(key))
@@ -121,7 +132,7 @@ def save_basins(reports: Sequence[ClosedLoopReport], path: Path) -> None:
     handles.append(Line2D([], [], color="black", marker="+", linestyle="", label="the walker's gait"))  # fmt: skip
     columns = len(handles) if len(reports) > 3 else len(reports) + 1
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False)
-    _save(figure, path)
+    save_figure(figure, path, dpi=_DPI)
 
 
 def save_pushes(reports: Sequence[ClosedLoopReport], path: Path) -> None:
@@ -132,9 +143,10 @@ def save_pushes(reports: Sequence[ClosedLoopReport], path: Path) -> None:
     worst = float(np.median(least)) if least else 1.0
     for k, (reach, title) in enumerate(((None, "all of it"), (2.2 * worst, "near the middle"))):
         axes: Any = figure.add_subplot(1, 2, k + 1, projection="polar")
-        for colour, report in zip(_colours(reports), reports, strict=True):
+        for report in pushed:
             if report.pushes is not None:
-                _draw_pushes(axes, report.pushes, colour, report.agent if k == 0 else None)
+                label = report.agent if k == 0 else None
+                _draw_pushes(axes, report.pushes, agent_colour(report.agent), label)
         axes.set_ylim(0.0, reach)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         axes.set_rlabel_position(67.5)
@@ -148,7 +160,7 @@ def save_pushes(reports: Sequence[ClosedLoopReport], path: Path) -> None:
     figure.suptitle(f"{reports[0].task}: largest push survived (rad / time unit)")
     if pushed:
         figure.legend(loc="outside right center", frameon=False)
-    _save(figure, path)
+    save_figure(figure, path, dpi=_DPI)
 
 
 _COMPASS = (
@@ -159,7 +171,7 @@ _COMPASS = (
 )
 
 
-def _draw_pushes(axes: Any, pushes: LargestPushes, colour: str, label: str | None) -> None:
+def _draw_pushes(axes: Any, pushes: LargestPushes, colour: Any, label: str | None) -> None:
     """A closed line; a ring where nothing within reach fells the walker."""
     angles = np.append(pushes.angles, pushes.angles[0])
     sizes = np.append(pushes.sizes, pushes.sizes[0])
@@ -168,19 +180,5 @@ def _draw_pushes(axes: Any, pushes: LargestPushes, colour: str, label: str | Non
     axes.plot(pushes.angles[beyond], pushes.sizes[beyond], "o", color=colour, markersize=8)
 
 
-def _colours(reports: Sequence[ClosedLoopReport]) -> list[str]:
-    known = list(AGENTS)
-    places = [
-        known.index(report.agent) if report.agent in known else len(known) + k
-        for k, report in enumerate(reports)
-    ]
-    return [COLOURS[place % len(COLOURS)] for place in places]
-
-
 def _ending(key: float) -> str:
     return "still walking" if key == 0.0 else f"fell: {ENDINGS[key]}"
-
-
-def _save(figure: Any, path: Path) -> None:
-    with written_whole(path) as temporary:
-        figure.savefig(temporary, dpi=_DPI)

@@ -79,7 +79,7 @@ def resample(values: Vector, stream: int = 0) -> Resampled:
     trainings, episodes = values.shape
     if trainings * episodes == 0:
         raise ValueError(
-            f"values must hold one training and one episode or more, not {values.shape}"
+            f"values must hold one training and one episode or more, got shape {values.shape}"
         )
     defined = values[np.isfinite(values)]
     if len(defined) == 0 or defined.min() == defined.max():  # resampling has nothing to draw

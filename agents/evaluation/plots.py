@@ -3,36 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from agents.evaluation.claims import direction
-from agents.evaluation.push_levels import LevelRow
-from agents.evaluation.results import Row, is_share
-from agents.evaluation.tables import estimate
-from agents.registry import KINDS, Kind, agent_entry
 from lean_yaw_env.envs.tasks import task_named
-from lean_yaw_env.files import written_whole
-from lean_yaw_env.rendering.picture import new_figure
+from lean_yaw_env.rendering.figures import new_figure, save_figure
 
-_DPI = 150
+from ..registry import agent_colour
+from .comparison import direction
+from .results import Row, is_share
+from .tables import estimate
+
 _COLUMNS = 4
 _INK = "0.2"
-_KIND_COLOURS: dict[Kind, str] = {
-    "baseline": "0.45",
-    "feedback": "tab:blue",
-    "planner": "tab:purple",
-    "learned": "tab:orange",
-}
 _LINES = ("-", "--", "-.", ":")
 _MARKERS = "osD^vP*X"
 
 
 def save_leaderboard_plot(rows: Sequence[Row], path: Path) -> None:
-    """A panel for each task: its headline, an agent to a line."""
+    """A panel for each task: its headline, an agent to a line, each agent in its colour."""
     tasks = list(dict.fromkeys(row.task for row in rows))
     columns = min(_COLUMNS, len(tasks))
     lines = math.ceil(len(tasks) / columns)
@@ -45,18 +37,13 @@ def save_leaderboard_plot(rows: Sequence[Row], path: Path) -> None:
         _draw_headline(axes, found, task, headline)
     for axes in places[len(tasks) :]:
         axes.set_axis_off()
-    present: set[Kind] = {agent_entry(row.agent).kind for row in rows}
-    kinds: list[Kind] = [kind for kind in KINDS if kind in present]
     handles = [
-        Line2D([], [], color=_KIND_COLOURS[kind], marker="o", linestyle="-", label=kind)
-        for kind in kinds
+        _key("o", "interquartile mean or share, 95 % interval"),
+        _key("o", "mean", "none"),
+        _key("|", "lowest and highest mean of a training"),
     ]
-    handles.append(_key("o", "interquartile mean or share, 95 % interval"))
-    handles.append(_key("o", "mean", "none"))
-    handles.append(_key("|", "lowest and highest mean of a training"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=2 * columns, fontsize="small", frameon=False)  # fmt: skip
-    with written_whole(path) as temporary:
-        figure.savefig(temporary, dpi=_DPI)
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize="small", frameon=False)  # fmt: skip
+    save_figure(figure, path)
 
 
 def _key(marker: str, label: str, fill: str = _INK) -> Line2D:
@@ -66,7 +53,7 @@ def _key(marker: str, label: str, fill: str = _INK) -> Line2D:
 def _draw_headline(axes: Axes, rows: Sequence[Row], task: str, headline: str) -> None:
     share = is_share(task, headline)
     for place, row in enumerate(rows):
-        colour = _KIND_COLOURS[agent_entry(row.agent).kind]
+        colour = agent_colour(row.agent)
         value, low, high = estimate(row, mean=share)
         axes.plot([low, high], [place, place], color=colour, linewidth=3.0, alpha=0.6, solid_capstyle="butt")  # fmt: skip
         axes.plot(value, place, "o", color=colour, markersize=5)
@@ -89,33 +76,27 @@ def _draw_headline(axes: Axes, rows: Sequence[Row], task: str, headline: str) ->
     axes.set_axisbelow(True)
 
 
-def save_push_levels_plot(rows: Sequence[LevelRow], path: Path) -> None:
-    """Share of walkers on their feet after 200 steps against push level, with 95 % intervals."""
+def save_push_levels_plot(levels: Mapping[float, Sequence[Row]], path: Path) -> None:
+    """Share of walkers that have not fallen after 200 steps against push level, by agent, with 95 % intervals."""
     figure = new_figure(6.4, 4.0)
     axes = figure.subplots()
-    drawn: dict[Kind, int] = {}
-    for k, agent in enumerate(dict.fromkeys(each.row.agent for each in rows)):
-        kind = agent_entry(agent).kind
-        style = _LINES[drawn.get(kind, 0) % len(_LINES)]
-        drawn[kind] = drawn.get(kind, 0) + 1
-        found = sorted(
-            (each for each in rows if each.row.agent == agent), key=lambda each: each.level
+    for k, agent in enumerate(dict.fromkeys(row.agent for rows in levels.values() for row in rows)):
+        found = {level: row for level, rows in levels.items() for row in rows if row.agent == agent}
+        low, high, share = (
+            [getattr(row, name) for row in found.values()] for name in ("low", "high", "mean")
         )
-        levels = [each.level for each in found]
-        colour = _KIND_COLOURS[kind]
-        axes.fill_between(
-            levels, [each.row.low for each in found], [each.row.high for each in found],
-            color=colour, alpha=0.15, linewidth=0.0,
+        colour = agent_colour(agent)
+        axes.fill_between(list(found), low, high, color=colour, alpha=0.15, linewidth=0.0)
+        axes.plot(
+            list(found), share, _LINES[k % len(_LINES)], marker=_MARKERS[k % len(_MARKERS)],
+            color=colour, label=agent, markersize=5,
         )  # fmt: skip
-        shares = [each.row.mean for each in found]
-        axes.plot(levels, shares, style, marker=_MARKERS[k % len(_MARKERS)], color=colour, label=agent, markersize=5)  # fmt: skip
     axes.set_xlabel(
         "push level (1: standard deviations 0.08 on the pitch rate, 0.15 on the ankle rate)"
     )
-    axes.set_ylabel("on their feet after 200 steps")
+    axes.set_ylabel("share not fallen after 200 steps")
     axes.set_ylim(-0.02, 1.02)
     axes.grid(color="0.9")
     axes.set_axisbelow(True)
     figure.legend(loc="outside right center", fontsize="small", frameon=False)
-    with written_whole(path) as temporary:
-        figure.savefig(temporary, dpi=_DPI)
+    save_figure(figure, path)

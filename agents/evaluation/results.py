@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.evaluation.intervals import Estimate, Resampled, resample, share_estimate
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import Vector
+
+from .intervals import Estimate, Resampled, resample, share_estimate
 
 RETURN = "return"
 SPEED = "speed"
@@ -70,7 +71,7 @@ class Row:
     difference, difference_low, difference_high : float
         The mean less that agent's, with its 95 % interval; NaN where there is no comparison.
     verdict : str or None
-        "better", "worse", "tie" or "mixed": see ``claims.Comparison``.
+        "better", "worse", "tie" or "mixed": see ``comparison.Comparison``.
     """
 
     task: str
@@ -112,7 +113,7 @@ class Results:
         lengths = {len(run.survived) for run in self.runs}
         if len(lengths) != 1:
             raise ValueError(
-                f"runs must be one or more of the same episodes, not of {sorted(lengths)}"
+                f"runs must be one or more of the same episodes, got runs of {sorted(lengths)}"
             )
 
     @property

@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from dataclasses import asdict, fields
 
 from rich import box
+from rich.console import Console
 from rich.table import Table
 
-from agents.evaluation.results import RETURN, Row, is_share
+from .results import RETURN, Row, is_share
 
 _WIDTH = 5  # agents in a table: so many fit a terminal of 80 columns
 
@@ -112,3 +113,12 @@ def estimate(row: Row, *, mean: bool) -> tuple[float, float, float]:
 def number(value: float) -> str:
     """As many digits as intervals of some thousand episodes leave."""
     return f"{value:.1f}" if abs(value) >= 10.0 else f"{value:.3f}"
+
+
+def show(rows: Sequence[Row], console: Console, *, as_json: bool = False) -> None:
+    """Print rows, as tables or as JSON."""
+    if as_json:
+        console.print(rows_to_json(rows), soft_wrap=True, highlight=False, markup=False)
+        return
+    for table in results_tables(rows):
+        console.print(table)

@@ -1,4 +1,4 @@
-"""A film of an agent at every task, with what is asked of it: ``python -m agents.evaluation.videos --help``."""
+"""Films of agents at their tasks, with what is asked of them and the pushes that they get."""
 
 from __future__ import annotations
 
@@ -8,23 +8,18 @@ import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
-import typer
 from tqdm import tqdm
 
-from agents.agent import Agent, State, attach
-from agents.evaluation.videos_push import draw_push
-from agents.registry import AGENTS, AgentRequest, env_id_of, make_agent, names_for
-from agents.seeds import evaluation_seed
-from lean_yaw_env.envs import columns as c
+from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.pictures import Footage
+from lean_yaw_env.envs.state import Records
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.files import require_ending, written_whole
-from lean_yaw_env.parameters import Foot, Vector, require_number
-from lean_yaw_env.registration import TASK_VERSIONS
+from lean_yaw_env.parameters import Foot, Vector
 from lean_yaw_env.rendering.filming import (
     SECONDS_PER_TIME_UNIT,
     Frame,
@@ -34,11 +29,15 @@ from lean_yaw_env.rendering.filming import (
     swing_angle,
 )
 from lean_yaw_env.rendering.geometry import Pose
+from lean_yaw_env.rendering.palette import ANKLE_AXIS, FAINT_INK, FLOOR, INK
 from lean_yaw_env.rendering.pygame_renderer import Renderer
 from lean_yaw_env.rendering.scene import Scene
+from lean_yaw_env.validation import require_number
 from lean_yaw_env.walker import Walker
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+from ..agent import Agent, State, attach
+from ..registry import AgentRequest, agent_entry, env_id_of, make_agent, names_for
+from ..seeds import evaluation_seed
 
 SIZE = (600, 380)
 FPS = 10.0
@@ -50,6 +49,10 @@ HOLD_SECONDS = 1.0
 """How long a film stays with a walker that has fallen."""
 STAND_INS = ("lqr", "feedback", "fixed")
 """Who is filmed where there is no trained agent, the first that is for the task."""
+DIAL_RADIUS = 22.0
+"""Of the dial that shows pushes, pixels: a push of ``_DIAL_REACH`` standard deviations."""
+_DIAL_REACH = 2.0
+_DIAL_PLACE = (0.5, 28.0)  # share of the width, pixels from the top
 _SAMPLES = 17  # of the motion within a step
 
 
@@ -162,8 +165,8 @@ def record_steps(
     env = WalkerEnv(task, **vars(EnvOptions() if options is None else options))
     observation, info = env.reset(seed=seed)
     attach(agent, env)
-    walker = Walker(env.rows.body_parameters(0))
-    footage = Footage(env.rows)
+    walker = Walker(env.simulation.body_parameters(0))
+    footage = Footage(env.simulation)
     steps: list[FilmedStep] = []
     state: State = None
     ended, now = False, 0.0
@@ -173,7 +176,7 @@ def record_steps(
         observation, _, terminated, truncated, info = env.step(action)
         footage.extend()
         ended = terminated or truncated
-        steps.append(_filmed(walker, scene, before, info, now, env.rows.settings))
+        steps.append(_filmed(walker, scene, before, info, now, env.simulation.settings))
         now = steps[-1].end
     env.close()
     return steps
@@ -185,7 +188,7 @@ def _filmed(
     before: dict[str, Any],
     after: dict[str, Any],
     now: float,
-    settings: Vector,
+    settings: Records,
 ) -> FilmedStep:
     foot: Foot = "left" if before["stance_side"] > 0.0 else "right"
     duration = max(float(after["duration"]), 1e-6)  # a fall at the start of a step lasts no time
@@ -212,16 +215,16 @@ def _filmed(
         centre=before["footprint"] + turned,
         angles=(float(before["inter_leg_angle"]), float(after["inter_leg_angle"])),
         push=_push(before, settings),
-        fall=after["fall"],
+        fall=FallCode(after["fall"]).word,
     )
 
 
-def _push(info: dict[str, Any], settings: Vector) -> tuple[float, float] | None:
+def _push(info: dict[str, Any], settings: Records) -> tuple[float, float] | None:
     if "pitch_push" not in info:
         return None
     return (
-        info["pitch_push"] / settings[c.PITCH_PUSH_SIZE],
-        info["ankle_push"] / settings[c.ANKLE_PUSH_SIZE],
+        float(info["pitch_push"] / settings["pitch_push"][0]),
+        float(info["ankle_push"] / settings["ankle_push"][0]),
     )
 
 
@@ -268,52 +271,42 @@ def agent_for(name: str, task: str, runs: Path, path: Path | None = None) -> tup
     ValueError
         If there is no agent or task of that name, or none of them is for the task.
     """
-    if name not in AGENTS:
-        raise ValueError(f"agent must be among {', '.join(AGENTS)}, not {name!r}")
+    agent_entry(name)
     request = AgentRequest(env_id_of(task), EnvOptions(), path=path, runs=runs)
     found = names_for(request)
     for candidate in (name, *STAND_INS):
         if candidate in found:
             return candidate, make_agent(candidate, request)
-    raise ValueError(f"agent must be one for {task}: {', '.join(found)}; not {name!r}")
+    raise ValueError(f"agent must be one for {task}: {', '.join(found)}; got {name!r}")
 
 
-@app.command()
-def main(
-    task: Annotated[str, typer.Option(help="A task's name, or all.")] = "all",
-    agent: Annotated[
-        str, typer.Option(help="Who is filmed; where it is not trained for a task, lqr is.")
-    ] = "ppo",
-    out: Annotated[Path, typer.Option(help="Folder for <task>.gif.")] = Path("docs/videos"),
-    seed: Annotated[int, typer.Option(help="Another number films other episodes.")] = 0,
-    seconds: Annotated[float, typer.Option(help="Of each film.")] = SECONDS,
-    speed: Annotated[float, typer.Option(help="Times real time for legs of a metre.")] = SPEED,
-    fps: Annotated[float, typer.Option(help="Frames per second.")] = FPS,
-    size: Annotated[
-        tuple[int, int], typer.Option(help="Width and height, pixels; films of 600 380 are small.")
-    ] = SIZE,
-    ending: Annotated[
-        Literal["gif", "mp4"], typer.Option("--format", help="gif, which web pages show, or mp4.")
-    ] = "gif",
-    agent_path: Annotated[Path | None, typer.Option(help="Folder of the trained agent.")] = None,
-    runs: Annotated[Path, typer.Option(help="Where trainings left their folders.")] = Path("runs"),
-) -> None:
-    """Film an agent at every task, in an episode it was not trained on, with heading, goal, path and pushes drawn."""
-    try:
-        tasks = list(TASK_VERSIONS) if task == "all" else [task]
-        filmed = [(each, *agent_for(agent, each, runs, agent_path)) for each in tasks]
-        out.mkdir(parents=True, exist_ok=True)
-        for each, name, made in filmed:
-            path = out / f"{each.lower()}.{ending}"
-            fall = film_agent(
-                made, each, path, seed=seed, seconds=seconds, speed=speed, fps=fps, size=size,
-                name=f"{each}: {name}", progress=True,
-            )  # fmt: skip
-            how = f", falls {fall}" if fall else ""
-            typer.echo(f"{path}: {name}, {path.stat().st_size / 1e6:.2f} MB{how}")
-    except ValueError as error:
-        raise typer.BadParameter(str(error)) from error
+def draw_push(frame: Frame, push: tuple[float, float] | None) -> Frame:
+    """A frame with the push (pitch rate, ankle rate), in standard deviations, as an arrow.
 
+    A negative pitch rate is forward and up on the dial; a positive ankle rate is to the right.
+    """
+    if push is None:
+        return frame
+    from PIL import Image, ImageDraw
 
-if __name__ == "__main__":
-    app()
+    picture = Image.fromarray(frame)
+    draw = ImageDraw.Draw(picture)
+    x, y = _DIAL_PLACE[0] * frame.shape[1], _DIAL_PLACE[1]
+    draw.ellipse(
+        (x - DIAL_RADIUS, y - DIAL_RADIUS, x + DIAL_RADIUS, y + DIAL_RADIUS),
+        fill=FLOOR,
+        outline=FAINT_INK,
+    )
+    draw.text((x, y + DIAL_RADIUS + 2.0), "push", fill=INK, anchor="mt")
+    pitch, ankle = push
+    size = min(math.hypot(pitch, ankle) / _DIAL_REACH, 1.0) * DIAL_RADIUS
+    angle = math.atan2(-pitch, ankle)  # from the right, upward
+    tip = (x + size * math.cos(angle), y - size * math.sin(angle))
+    draw.line((x, y, *tip), fill=ANKLE_AXIS, width=3)
+    barbs = [
+        (tip[0] - 8.0 * math.cos(angle + turn), tip[1] + 8.0 * math.sin(angle + turn))
+        for turn in (-0.5, 0.5)
+    ]
+    if size > 1.0:
+        draw.polygon([tip, *barbs], fill=ANKLE_AXIS)
+    return np.asarray(picture).copy()

@@ -1,27 +1,32 @@
-"""The learning algorithms by name: the one place where a new one is registered."""
+"""The learning algorithms by name: the one place where a new one is registered, and the call that trains any of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
-from agents.learning.gradient.settings import GradientSettings
-from agents.learning.gradient.settings import settings_for as gradient_settings_for
-from agents.learning.gradient.training import train_gradient
-from agents.learning.ppo import train_ppo
-from agents.learning.ppo_settings import PPOSettings, settings_for
-from agents.learning.results import Trained
-from agents.learning.sac import train_sac
-from agents.learning.sac_settings import SACSettings
-from agents.learning.sac_settings import settings_for as sac_settings_for
+from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.registration import TASK_VERSIONS
+from lean_yaw_env.validation import require_choice
+
+from ..observations import ObservationLayout
+from ..policies.policy import Policy, PolicyCard, package_versions
+from ..policies.storage import task_of
+from ..settings import tuned
+from .apg import GradientLearner, GradientSettings
+from .learner import LearnerSettings, MakeLearner, settings_to_plain, torch_threads
+from .ppo import PPOLearner, PPOSettings
+from .recorder import Recorder, Report, TrainingLog
+from .sac import SACLearner, SACSettings
 
 
-class Settings(Protocol):
-    """A frozen dataclass of plain values, with the number of steps among them."""
+@dataclass(frozen=True)
+class Trained:
+    """What a training gives."""
 
-    @property
-    def steps(self) -> int: ...
+    policy: Policy
+    log: TrainingLog
 
 
 @dataclass(frozen=True)
@@ -31,39 +36,110 @@ class Algorithm:
     Attributes
     ----------
     settings : class of its settings
-    settings_for : gives an environment's settings, by its id
-    train : of the signature of ``train_ppo``
+    make : its learner's class
     """
 
-    settings: type
-    settings_for: Callable[[str], Any]
-    train: Callable[..., Trained]
+    settings: type[LearnerSettings]
+    make: MakeLearner
 
 
 ALGORITHMS: dict[str, Algorithm] = {
-    "ppo": Algorithm(PPOSettings, settings_for, train_ppo),
-    "sac": Algorithm(SACSettings, sac_settings_for, train_sac),
-    "apg": Algorithm(GradientSettings, gradient_settings_for, train_gradient),
+    "ppo": Algorithm(PPOSettings, PPOLearner),
+    "sac": Algorithm(SACSettings, SACLearner),
+    "apg": Algorithm(GradientSettings, GradientLearner),
 }
 """By the names that their policies carry."""
 
 
-def algorithm_named(name: str) -> Algorithm:
-    """The algorithm of this name, or ``ValueError``."""
-    if name not in ALGORITHMS:
-        raise ValueError(f"algorithm must be one of {', '.join(ALGORITHMS)}, not {name!r}")
-    return ALGORITHMS[name]
+def settings_for(algorithm: str, task: str) -> Any:
+    """An algorithm's settings for a task: those that come with the package, or the default ones.
 
-
-def settings_to_plain(settings: Any) -> dict[str, Any]:
-    """Settings as JSON holds them."""
-    return {
-        key: list(value) if isinstance(value, tuple) else value
-        for key, value in asdict(settings).items()
-    }
+    Raises
+    ------
+    ValueError
+        For an algorithm or a task there is not.
+    """
+    entry = ALGORITHMS[require_choice("algorithm", algorithm, ALGORITHMS)]
+    require_choice("task", task, TASK_VERSIONS)
+    return tuned(algorithm, task, entry.settings())
 
 
 def settings_from_plain(algorithm: str, plain: dict[str, Any]) -> Any:
-    """The settings that ``settings_to_plain`` wrote, or ``TypeError`` or ``ValueError``."""
+    """The settings that ``learner.settings_to_plain`` wrote, or ``TypeError`` or ``ValueError``."""
     values = {k: tuple(v) if isinstance(v, list) else v for k, v in plain.items()}
-    return algorithm_named(algorithm).settings(**values)
+    return ALGORITHMS[require_choice("algorithm", algorithm, ALGORITHMS)].settings(**values)
+
+
+def train(
+    algorithm: str,
+    env_id: str,
+    settings: LearnerSettings,
+    *,
+    seed: int = 0,
+    options: EnvOptions | None = None,
+    checkpoint: Path | None = None,
+    checkpoint_seconds: float = 5.0,
+    threads: int = 1,
+    progress: bool = True,
+    report: Report | None = None,
+    tensorboard: Path | None = None,
+) -> Trained:
+    """Train a policy, going on from the checkpoint if its file is there.
+
+    Interrupted and gone on with the same arguments, a training gives what it would have given uninterrupted, bit for bit.
+
+    Parameters
+    ----------
+    algorithm : a name in ``ALGORITHMS``
+    env_id, settings, seed, options : what to train
+    checkpoint : file for the training's state, written whole; none without
+    checkpoint_seconds : least time between two of them
+    threads : of torch and of the walkers
+    progress : show a bar
+    report : told of the steps done and the latest returns, between updates
+    tensorboard : folder for TensorBoard's logs; none without
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, or the algorithm cannot learn the task under these options.
+    CheckpointError
+        If the checkpoint is damaged or another training's.
+    """
+    chosen = EnvOptions() if options is None else options
+    with torch_threads(threads):
+        learner = ALGORITHMS[require_choice("algorithm", algorithm, ALGORITHMS)].make(
+            env_id, settings, seed, chosen, threads, tensorboard
+        )
+        recorder = Recorder(
+            settings.steps,
+            learner.capture,
+            checkpoint=checkpoint,
+            seconds=checkpoint_seconds,
+            progress=progress,
+            label=f"training, seed {seed}",
+            report=report,
+        )
+        saved = recorder.saved()
+        if saved is not None:
+            learner.restore(saved)
+        recorder.start(learner.steps)
+        try:
+            learner.learn(recorder)
+            recorder.finish(learner.steps)
+        finally:
+            recorder.close()
+    log = recorder.log()
+    card = PolicyCard(
+        env_id=env_id,
+        options=chosen,
+        layout=ObservationLayout.of(task_of(env_id), chosen),
+        algorithm=algorithm,
+        activation=learner.activation,
+        output=learner.output,
+        seed=seed,
+        settings=settings_to_plain(settings),
+        training={"steps": learner.steps, "seconds": round(log.seconds, 1)},
+        versions=package_versions(),
+    )
+    return Trained(Policy(card, learner.weights()), log)

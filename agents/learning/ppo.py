@@ -1,153 +1,123 @@
-"""PPO on the compiled batch of walkers: make it, train it, resume it, and take its policy."""
+"""PPO on the compiled batch of walkers: its settings, its model, and its policy."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict
+import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3 import PPO
-from torch.optim import Optimizer
 
-from agents.learning.checkpoint import capture, restore
-from agents.learning.environment import float_array, observation_weights, training_environment
-from agents.learning.keeper import Keeping, learn, torch_threads
-from agents.learning.ppo_settings import PPOSettings
-from agents.learning.results import Report, Trained, TrainingLog
-from agents.learning.rollouts import TimeDiscountedBuffer
-from agents.learning.schedules import Falling
-from agents.observations import ObservationLayout
-from agents.policies.policy import Policy, PolicyCard
-from agents.policies.storage import task_of
-from agents.seeds import training_seed
-from agents.versions import package_versions
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.validation import require_number
+
+from ..seeds import training_seed
+from .experience import TimeDiscountedBuffer
+from .learner import LearnerSettings, float_array
+from .sb3 import Falling, StableBaselinesLearner, training_environment
 
 
-def train_ppo(
-    env_id: str,
-    settings: PPOSettings,
-    *,
-    seed: int = 0,
-    options: EnvOptions | None = None,
-    checkpoint: Path | None = None,
-    checkpoint_seconds: float = 5.0,
-    threads: int = 1,
-    progress: bool = True,
-    report: Report | None = None,
-    tensorboard: Path | None = None,
-) -> Trained:
-    """Train a policy, going on from the checkpoint if its file is there.
+@dataclass(frozen=True)
+class PPOSettings(LearnerSettings):
+    """Settings of Stable-Baselines3's PPO, with those of ``LearnerSettings``; layers are tanh.
 
-    Interrupted and gone on with the same arguments, a training gives what it would have given uninterrupted, bit for bit.
-
-    Parameters
+    Attributes
     ----------
-    env_id, settings, seed, options : what to train
-    checkpoint : file for the training's state, written whole; none without
-    checkpoint_seconds : least time between two of them
-    threads : of torch and of the walkers
-    progress : show a bar
-    report : told of the steps done and the latest returns, between updates
-    tensorboard : folder for TensorBoard's logs; none without
-
-    Raises
-    ------
-    ValueError
-        If a number is out of its range.
-    CheckpointError
-        If the checkpoint is damaged or another training's.
+    steps_per_update : steps of each walker between two updates of the policy
+    batch_size : samples of one gradient step
+    epochs : passes over the samples of an update
+    gae_lambda : of the generalised advantage estimate
+    clip_range : of the policy's ratio
+    entropy : weight of the entropy bonus
+    value_weight : weight of the value's loss
+    largest_gradient : norm that gradients are clipped to
+    initial_log_std : logarithm of the standard deviation of actions at the start
     """
-    chosen = EnvOptions() if options is None else options
-    with torch_threads(threads):
-        model = _make_model(env_id, settings, seed, chosen, threads, tensorboard)
-        keeping = Keeping(
-            settings.steps,
-            lambda: capture(model, _optimizers(model)),
-            checkpoint,
-            checkpoint_seconds,
-            progress,
-            label=f"training, seed {seed}",
-            report=report,
+
+    steps: int = 4_000_000
+    walkers: int = 256
+    steps_per_update: int = 128
+    batch_size: int = 2048
+    epochs: int = 4
+    gae_lambda: float = 0.9
+    clip_range: float = 0.2
+    entropy: float = 0.0
+    value_weight: float = 0.5
+    largest_gradient: float = 0.5
+    initial_log_std: float = -0.5
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require_counts("steps_per_update", "batch_size", "epochs")
+        self.require_shares("gae_lambda")
+        self.require_positive("clip_range", "largest_gradient")
+        for name in ("entropy", "value_weight"):
+            require_number(name, getattr(self, name), 0.0, math.inf, "[)")
+        require_number("initial_log_std", self.initial_log_std, -20.0, 2.0)
+        samples = self.walkers * self.steps_per_update
+        if samples % self.batch_size:
+            raise ValueError(
+                f"batch_size must divide the {samples} samples of an update, got {self.batch_size}"
+            )
+
+
+class PPOLearner(StableBaselinesLearner):
+    """PPO with a discount in time; see ``learner.Learner``."""
+
+    activation = "tanh"
+    output = "clip"
+
+    def __init__(
+        self,
+        env_id: str,
+        settings: PPOSettings,
+        seed: int,
+        options: EnvOptions,
+        threads: int,
+        tensorboard: Path | None,
+    ) -> None:
+        first = training_seed(seed)
+        env, walkers = training_environment(env_id, settings, options, threads)
+        model = PPO(
+            "MlpPolicy",
+            env,
+            n_steps=settings.steps_per_update,
+            batch_size=settings.batch_size,
+            n_epochs=settings.epochs,
+            learning_rate=Falling.of(settings),
+            gamma=settings.typical_discount,
+            gae_lambda=settings.gae_lambda,
+            clip_range=settings.clip_range,
+            ent_coef=settings.entropy,
+            vf_coef=settings.value_weight,
+            max_grad_norm=settings.largest_gradient,
+            policy_kwargs={
+                "net_arch": list(settings.hidden),
+                "log_std_init": settings.initial_log_std,
+                "activation_fn": torch.nn.Tanh,
+            },
+            rollout_buffer_class=TimeDiscountedBuffer,
+            rollout_buffer_kwargs={"time_constant": settings.time_constant},
+            tensorboard_log=None if tensorboard is None else str(tensorboard),
+            seed=seed,
+            device="cpu",
         )
+        walkers.seed(first)  # in place of the policy's seed, which SB3 gives them too
         buffer = cast(TimeDiscountedBuffer, model.rollout_buffer)
-        log = learn(
-            model, keeping, buffer, lambda arrays: restore(model, arrays, _optimizers(model))
-        )
-        policy = policy_of(model, env_id, settings, seed, chosen, log)
-    return Trained(policy, log)
+        super().__init__(model, buffer, {"adam": model.policy.optimizer}, settings.steps)
+        self._depth = len(settings.hidden)
 
+    def layers(self) -> dict[str, str]:
+        """The policy's hidden layers, and the one that gives the mean action."""
+        hidden = {f"layers.{k}": f"mlp_extractor.policy_net.{2 * k}" for k in range(self._depth)}
+        return hidden | {f"layers.{self._depth}": "action_net"}
 
-def policy_of(
-    model: PPO,
-    env_id: str,
-    settings: PPOSettings,
-    seed: int,
-    options: EnvOptions,
-    log: TrainingLog,
-) -> Policy:
-    """The model's policy for inference, with the statistics that normalise its observations."""
-    tensors: Mapping[str, torch.Tensor] = model.policy.state_dict()
-    weights = observation_weights(model.get_vec_normalize_env())
-    weights["log_std"] = float_array(tensors["log_std"])
-    names = [f"mlp_extractor.policy_net.{2 * k}" for k in range(len(settings.hidden))]
-    for k, name in enumerate([*names, "action_net"]):
-        for part in ("weight", "bias"):
-            weights[f"layers.{k}.{part}"] = float_array(tensors[f"{name}.{part}"])
-    card = PolicyCard(
-        env_id=env_id,
-        options=options,
-        layout=ObservationLayout.of(task_of(env_id), options),
-        algorithm="ppo",
-        activation="tanh",
-        output="clip",
-        seed=seed,
-        settings={**asdict(settings), "hidden": list(settings.hidden)},
-        training={"steps": int(model.num_timesteps), "seconds": round(log.seconds, 1)},
-        versions=package_versions(),
-    )
-    return Policy(card, weights)
-
-
-def _make_model(
-    env_id: str,
-    settings: PPOSettings,
-    seed: int,
-    options: EnvOptions,
-    threads: int,
-    tensorboard: Path | None,
-) -> PPO:
-    first = training_seed(seed)
-    env, walkers = training_environment(env_id, settings, options, threads)
-    model = PPO(
-        "MlpPolicy",
-        env,
-        n_steps=settings.steps_per_update,
-        batch_size=settings.batch_size,
-        n_epochs=settings.epochs,
-        learning_rate=Falling(settings.learning_rate, settings.final_learning_rate),
-        gamma=settings.typical_discount,
-        gae_lambda=settings.gae_lambda,
-        clip_range=settings.clip_range,
-        ent_coef=settings.entropy,
-        vf_coef=settings.value_weight,
-        max_grad_norm=settings.largest_gradient,
-        policy_kwargs={
-            "net_arch": list(settings.hidden),
-            "log_std_init": settings.initial_log_std,
-            "activation_fn": torch.nn.Tanh,
-        },
-        rollout_buffer_class=TimeDiscountedBuffer,
-        rollout_buffer_kwargs={"time_constant": settings.time_constant},
-        tensorboard_log=None if tensorboard is None else str(tensorboard),
-        seed=seed,
-        device="cpu",
-    )
-    walkers.seed(first)  # in place of the policy's seed, which SB3 gives them too
-    return model
-
-
-def _optimizers(model: PPO) -> dict[str, Optimizer]:
-    return {"adam": model.policy.optimizer}
+    def weights(self) -> dict[str, NDArray[np.float32]]:
+        """With the deviation of actions, which PPO has the same for all observations."""
+        return super().weights() | {
+            "log_std": float_array(self.model.policy.state_dict()["log_std"])
+        }

@@ -1,48 +1,56 @@
-"""One training repeated with several seeds: a run for each, then their learning curves and what differs between them."""
+"""One training repeated with several seeds: a run for each, side by side if wanted, then their learning curves and what differs between them."""
 
 from __future__ import annotations
 
 import csv
 import io
+import multiprocessing
 import re
+import signal
+import sys
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich import box
 from rich.table import Table
+from tqdm import tqdm
 
-from agents.files import read_json, write_json
-from agents.learning.curves import save_seeds_curves
-from agents.learning.processes import run_side_by_side
-from agents.learning.training import (
+from lean_yaw_env.files import read_json, write_json, write_text
+from lean_yaw_env.validation import require_count
+
+from ..registry import env_id_of
+from ..seeds import TRAINING_SEEDS
+from .curves import save_seeds_curves
+from .training import (
     EVALUATION_FILE,
     RUN_FILE,
     Training,
     is_finished,
     make_run,
+    new_folder,
     read_log,
     read_run,
-    resumed_run,
     run,
-    unfinished_runs,
 )
-from agents.policies.storage import task_of
-from agents.registry import env_id_of
-from agents.seeds import TRAINING_SEEDS
-from lean_yaw_env.files import written_whole
 
 SERIES_FILE = "series.json"
 CURVES_FILE = "learning_curves.png"
-SPREAD_FILE = "seeds.csv"
+SEEDS_FILE = "seeds.csv"
 _MOST_COLUMNS = 5  # seeds shown one by one: more do not fit a terminal
 
 
+class RunError(RuntimeError):
+    """A run whose process did not end well; what it wrote stays and can be gone on with."""
+
+
 @dataclass(frozen=True)
-class Spread:
+class SeedMeans:
     """A metric's mean over episodes, of each seed's policy.
 
     Attributes
@@ -62,10 +70,10 @@ class Spread:
 
 @dataclass(frozen=True)
 class SeriesResult:
-    """What a series left behind: its folder, the spread of each metric, and the other agents' means by metric and agent."""
+    """What a series left behind: its folder, the seeds' means of each metric, and the other agents' means by metric and agent."""
 
     folder: Path
-    spreads: list[Spread]
+    by_seed: list[SeedMeans]
     others: dict[str, dict[str, float]]
 
 
@@ -84,7 +92,7 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     seeds = tuple(seed for part in ranges for seed in part[: TRAINING_SEEDS + 1])
     if not all(ranges) or len(set(seeds)) < len(seeds) or max(seeds) >= TRAINING_SEEDS:
         raise ValueError(
-            f"seeds must be as 5 (0 to 4), 0-4 or 0,3,7, different and below {TRAINING_SEEDS}, not {text!r}"
+            f"seeds must be as 5 (0 to 4), 0-4 or 0,3,7, different and below {TRAINING_SEEDS}, got {text!r}"
         )
     return seeds
 
@@ -105,12 +113,7 @@ def new_series(task: str, seeds: Sequence[int], out: Path, choices: Mapping[str,
     """
     trainings = {seed: Training.of_task(task, **{**choices, "seed": seed}) for seed in seeds}
     first = next(iter(trainings.values()))
-    stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
-    name = f"{task}-{first.algorithm}-{stamp}-seeds"
-    folder, number = out / name, 1
-    while folder.exists():
-        number += 1
-        folder = out / f"{name}-{number}"
+    folder = new_folder(out, first, "seeds")
     for seed, training in trainings.items():
         make_run(training, folder / f"seed{seed}")
     record = {"env_id": first.env_id, "algorithm": first.algorithm, "seeds": list(trainings)}
@@ -126,27 +129,48 @@ def is_series(folder: Path) -> bool:
 def resumed(
     task: str, out: Path, folder: Path | None = None, choices: Mapping[str, Any] | None = None
 ) -> Path:
-    """The folder of a run or a series to go on with: the one given, or the newest unfinished one.
+    """The folder of a run or a series to go on with: the one given, or the newest unfinished one of the task under ``out``.
 
     Raises
     ------
     ValueError
         If there is none, it is finished, or there are choices: what is resumed keeps its own.
     """
-    if folder is not None and is_series(folder) and not choices:
-        if _is_finished(folder):
-            raise ValueError(f"the series in {str(folder)!r} is finished")
+    if choices:
+        names = ", ".join(choices)
+        raise ValueError(f"a resumed run keeps its own settings; leave out {names}")
+    if folder is not None:
+        kind = "series" if is_series(folder) else "run"
+        if kind == "run":
+            read_run(folder)
+        if _is_done(folder):
+            raise ValueError(f"the {kind} in {str(folder)!r} is finished")
         return folder
     env_id = env_id_of(task)
     records = [
         path
-        for path in out.glob(f"*/{SERIES_FILE}")
-        if read_json(path).get("env_id") == env_id and not _is_finished(path.parent)
+        for name in (SERIES_FILE, RUN_FILE)
+        for path in out.glob(f"*/{name}")
+        if read_json(path).get("env_id") == env_id and not _is_done(path.parent)
     ]
-    if folder is not None or choices or not records:
-        return resumed_run(task, out, folder, choices)
-    records += [place / RUN_FILE for place in unfinished_runs(task, out)]
+    if not records:
+        raise ValueError(
+            f"there is no unfinished training of {task} under {str(out)!r}; start one without --resume"
+        )
     return max(records, key=lambda path: path.stat().st_mtime).parent
+
+
+def _is_done(folder: Path) -> bool:
+    """Whether a run or a series is finished."""
+    return (folder / SEEDS_FILE).exists() if is_series(folder) else is_finished(folder)
+
+
+def runs_of(folder: Path) -> dict[int, Path]:
+    """The runs of a series by seed, or ``ValueError`` if the folder is not one's."""
+    record = read_json(folder / SERIES_FILE)
+    if not isinstance(record, dict) or not isinstance(record.get("seeds"), list):
+        raise ValueError(f"{str(folder / SERIES_FILE)!r} is not a series'")
+    return {int(seed): folder / f"seed{seed}" for seed in record["seeds"]}
 
 
 def run_series(folder: Path, *, jobs: int = 1, progress: bool = True) -> SeriesResult:
@@ -165,8 +189,7 @@ def run_series(folder: Path, *, jobs: int = 1, progress: bool = True) -> SeriesR
     RunError
         If a process fails.
     """
-    if jobs < 1:
-        raise ValueError(f"jobs must be 1 or more, not {jobs}")
+    require_count("jobs", jobs)
     runs = runs_of(folder)
     unfinished = [place for place in runs.values() if not is_finished(place)]
     if jobs > 1 and len(unfinished) > 1:
@@ -176,13 +199,80 @@ def run_series(folder: Path, *, jobs: int = 1, progress: bool = True) -> SeriesR
             run(place, progress=progress)
     result = _gathered(folder, runs)
     _draw(folder, runs, result)
-    _write_spreads(folder / SPREAD_FILE, result)  # last: it marks the series as finished
+    _write_means(folder / SEEDS_FILE, result)  # last: it marks the series as finished
     return result
 
 
-def spread_table(result: SeriesResult) -> Table:
+def run_side_by_side(folders: Sequence[Path], jobs: int, *, progress: bool = True) -> None:
+    """Finish runs, ``jobs`` of them at a time, each in a process of its own, under one bar; an interruption ends the processes.
+
+    Their checkpoints stay.
+
+    Raises
+    ------
+    RunError
+        If a process fails: the others are ended too.
+    """
+    steps = {folder: read_run(folder).settings.steps for folder in folders}
+    waiting = deque(folders)
+    active: dict[Connection, tuple[Path, SpawnProcess]] = {}
+    done = dict.fromkeys(folders, 0)
+    bar = tqdm(total=sum(steps.values()), unit="step", unit_scale=True, disable=not progress)
+    try:
+        while waiting or active:
+            while waiting and len(active) < jobs:
+                folder = waiting.popleft()
+                connection, process = _started(folder)
+                active[connection] = (folder, process)
+            ended = len(folders) - len(active) - len(waiting)
+            bar.set_description(f"trainings done: {ended} of {len(folders)}", refresh=False)
+            for ready in wait(list(active)):
+                assert isinstance(ready, Connection)
+                folder, process = active[ready]
+                try:
+                    done[folder] = ready.recv()
+                except EOFError:
+                    del active[ready]
+                    _require_success(folder, process)
+                    done[folder] = steps[folder]
+            bar.update(sum(done.values()) - bar.n)
+    finally:
+        bar.close()
+        for _, process in active.values():
+            process.terminate()
+        for _, process in active.values():
+            process.join()
+
+
+def _started(folder: Path) -> tuple[Connection, SpawnProcess]:
+    # a fresh interpreter: torch and compiled threads do not survive a fork
+    context = multiprocessing.get_context("spawn")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_run_and_tell, args=(folder, sender), daemon=True)
+    process.start()
+    sender.close()  # so that the end of the process is the end of the pipe
+    return receiver, process
+
+
+def _require_success(folder: Path, process: SpawnProcess) -> None:
+    process.join()
+    if process.exitcode != 0:
+        raise RunError(
+            f"the training in {str(folder)!r} ended with status {process.exitcode}; its own message is above, "
+            "and --resume goes on with it"
+        )
+
+
+def _run_and_tell(folder: Path, sender: Connection) -> None:
+    """The whole life of a process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to decide
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that half-written files are removed
+    run(folder, progress=False, report=lambda steps, _: sender.send(steps))
+
+
+def seeds_table(result: SeriesResult) -> Table:
     """A table of one series: a metric to a row, with the median and the range over its seeds."""
-    seeds = result.spreads[0].seeds
+    seeds = result.by_seed[0].seeds
     table = Table(
         title=f"means over episodes of {len(seeds)} seeds' policies",
         box=box.SIMPLE_HEAD,
@@ -193,23 +283,11 @@ def spread_table(result: SeriesResult) -> Table:
     one_by_one = seeds if len(seeds) <= _MOST_COLUMNS else ()
     for name in ("median", "lowest", "highest", *(f"seed {seed}" for seed in one_by_one)):
         table.add_column(name, justify="right", no_wrap=True)
-    for spread in result.spreads:
-        values = [spread.median, min(spread.means), max(spread.means)]
-        values += spread.means if one_by_one else ()
-        table.add_row(spread.metric.replace("_", " "), *(f"{value:.4g}" for value in values))
+    for each in result.by_seed:
+        values = [each.median, min(each.means), max(each.means)]
+        values += each.means if one_by_one else ()
+        table.add_row(each.metric.replace("_", " "), *(f"{value:.4g}" for value in values))
     return table
-
-
-def _is_finished(folder: Path) -> bool:
-    return (folder / SPREAD_FILE).exists()
-
-
-def runs_of(folder: Path) -> dict[int, Path]:
-    """The runs of a series by seed, or ``ValueError`` if the folder is not one's."""
-    record = read_json(folder / SERIES_FILE)
-    if not isinstance(record, dict) or not isinstance(record.get("seeds"), list):
-        raise ValueError(f"{str(folder / SERIES_FILE)!r} is not a series'")
-    return {int(seed): folder / f"seed{seed}" for seed in record["seeds"]}
 
 
 def _gathered(folder: Path, runs: Mapping[int, Path]) -> SeriesResult:
@@ -223,7 +301,7 @@ def _gathered(folder: Path, runs: Mapping[int, Path]) -> SeriesResult:
     own = means.pop(algorithm)
     return SeriesResult(
         folder,
-        [Spread(metric, tuple(runs), tuple(values)) for metric, values in own.items()],
+        [SeedMeans(metric, tuple(runs), tuple(values)) for metric, values in own.items()],
         {
             metric: {agent: float(np.mean(found[metric])) for agent, found in means.items()}
             for metric in own
@@ -233,26 +311,25 @@ def _gathered(folder: Path, runs: Mapping[int, Path]) -> SeriesResult:
 
 def _draw(folder: Path, runs: Mapping[int, Path], result: SeriesResult) -> None:
     training = read_run(next(iter(runs.values())))
-    name = training.algorithm.upper()
-    own = next(spread for spread in result.spreads if spread.metric == "return")
-    levels = {f"{a}, evaluated: {v:.1f}": v for a, v in result.others["return"].items()}
-    words = f"{name}, evaluated: {own.median:.1f}\n({min(own.means):.1f} to {max(own.means):.1f})"
+    own = next(each for each in result.by_seed if each.metric == "return")
+    words = f"{training.algorithm}, evaluated: {own.median:.1f}\n({min(own.means):.1f} to {max(own.means):.1f})"
     save_seeds_curves(
         [read_log(place) for place in runs.values()],
+        training.algorithm,
         (words, own.median),
-        levels,
-        f"{name} on {task_of(training.env_id)}, {len(runs)} seeds",
+        result.others["return"],
+        f"{training.algorithm.upper()} on {training.task}, {len(runs)} seeds",
         training.settings.steps,
         folder / CURVES_FILE,
     )
 
 
-def _write_spreads(path: Path, result: SeriesResult) -> None:
+def _write_means(path: Path, result: SeriesResult) -> None:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    seeds = result.spreads[0].seeds
+    seeds = result.by_seed[0].seeds
     writer.writerow(("metric", "median", "lowest", "highest", *(f"seed{seed}" for seed in seeds)))
-    for s in result.spreads:
-        writer.writerow((s.metric, s.median, min(s.means), max(s.means), *s.means))
-    with written_whole(path) as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")
+    for each in result.by_seed:
+        row = (each.metric, each.median, min(each.means), max(each.means), *each.means)
+        writer.writerow(row)
+    write_text(path, text.getvalue())

@@ -2,37 +2,31 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from tqdm import tqdm
 
-from agents.agent import Agent
-from agents.evaluation.pictures import save_agents_footprints, save_learning_curve
-from agents.evaluation.reporting import progress_bar
-from agents.evaluation.scoring import Row, evaluate
-from agents.evaluation.tables import rows_to_plain
-from agents.files import read_json, write_json
-from agents.learning.algorithms import (
-    Settings,
-    algorithm_named,
-    settings_from_plain,
-    settings_to_plain,
-)
-from agents.learning.results import Report, TrainingLog
-from agents.policies.policy import Policy
-from agents.policies.storage import CARD_FILE, options_from_plain, options_to_plain, save, task_of
-from agents.registry import AgentRequest, env_id_of, make_all
-from agents.seeds import MOST_EPISODES, evaluation_seed, training_seed
-from agents.versions import package_versions
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.files import written_whole
-from lean_yaw_env.parameters import require_number
+from lean_yaw_env.files import read_json, write_json
+from lean_yaw_env.validation import require_count
+
+from ..agent import Agent
+from ..evaluation.footprints import save_agents_footprints
+from ..evaluation.results import Row
+from ..evaluation.scoring import evaluate
+from ..evaluation.tables import rows_to_plain
+from ..policies.policy import Policy, package_versions
+from ..policies.storage import CARD_FILE, options_from_plain, options_to_plain, save, task_of
+from ..registry import AgentRequest, env_id_of, make_all
+from ..seeds import MOST_EPISODES, evaluation_seed, training_seed
+from .algorithms import settings_for, settings_from_plain, train
+from .curves import save_learning_curve
+from .learner import LearnerSettings, settings_to_plain
+from .recorder import Report, TrainingLog
 
 RUN_FILE = "run.json"
 CHECKPOINT_FILE = "checkpoint.safetensors"
@@ -40,7 +34,6 @@ LOG_FILE = "episodes.csv"
 CURVE_FILE = "learning_curve.png"
 FOOTPRINTS_FILE = "footprints.png"
 EVALUATION_FILE = "evaluation.json"
-_LOG_COLUMNS = ("steps", "return", "length", "survived")
 STATISTICS_FILE = "observation_statistics.json"
 EVALUATION = 0
 """Seed of the episodes that runs are judged on: the same for all of them, so that what differs is the training."""
@@ -65,7 +58,7 @@ class Training:
 
     env_id: str
     seed: int
-    settings: Settings
+    settings: LearnerSettings
     options: EnvOptions
     episodes: int = 1000
     threads: int = 1
@@ -86,16 +79,20 @@ class Training:
         """
         env_id = env_id_of(task)
         training_seed(seed)
-        require_number("episodes", others.get("episodes", cls.episodes), 1, MOST_EPISODES)
-        require_number("threads", others.get("threads", cls.threads), 1, 1024)
-        settings = algorithm_named(others.get("algorithm", cls.algorithm)).settings_for(env_id)
+        require_count("episodes", others.get("episodes", cls.episodes), 1, MOST_EPISODES)
+        require_count("threads", others.get("threads", cls.threads), 1, 1024)
+        settings = settings_for(others.get("algorithm", cls.algorithm), task)
         if steps is not None:
             settings = replace(settings, steps=steps)
         return cls(env_id, seed, settings, EnvOptions(), **others)
 
+    @property
+    def task(self) -> str:
+        return task_of(self.env_id)
+
 
 @dataclass(frozen=True)
-class Result:
+class FinishedRun:
     """What a training left behind."""
 
     folder: Path
@@ -103,15 +100,20 @@ class Result:
     rows: list[Row]
 
 
-def new_run(training: Training, out: Path) -> Path:
-    """Make the folder of a new run under ``out``, named by task, algorithm, time and seed, and note in it what is trained."""
+def new_folder(out: Path, training: Training, ending: str) -> Path:
+    """The path of a folder that is not there yet, named by task, algorithm, time and ``ending``."""
     stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
-    name = f"{task_of(training.env_id)}-{training.algorithm}-{stamp}-seed{training.seed}"
-    folder = out / name
-    number = 1
+    name = f"{training.task}-{training.algorithm}-{stamp}-{ending}"
+    folder, number = out / name, 1
     while folder.exists():
         number += 1
         folder = out / f"{name}-{number}"
+    return folder
+
+
+def new_run(training: Training, out: Path) -> Path:
+    """Make the folder of a new run under ``out``, and note in it what is trained."""
+    folder = new_folder(out, training, f"seed{training.seed}")
     make_run(training, folder)
     return folder
 
@@ -127,62 +129,6 @@ def make_run(training: Training, folder: Path) -> None:
         "evaluation_seed": evaluation_seed(EVALUATION),
     }
     write_json(folder / RUN_FILE, record)
-
-
-def started_run(
-    task: str, out: Path, folder: Path | None = None, choices: Mapping[str, Any] | None = None
-) -> Path:
-    """The folder of a new run with the task's settings and these choices, arguments of ``Training.of_task``.
-
-    Raises
-    ------
-    ValueError
-        If a choice is bad, or a folder is given: that is for runs to resume.
-    """
-    if folder is not None:
-        raise ValueError(f"run must not be given without --resume, but is {str(folder)!r}")
-    return new_run(Training.of_task(task, **(choices or {})), out)
-
-
-def resumed_run(
-    task: str, out: Path, folder: Path | None = None, choices: Mapping[str, Any] | None = None
-) -> Path:
-    """The folder of a run to go on with: the one given, or the newest unfinished one.
-
-    Raises
-    ------
-    ValueError
-        If there is none, it is finished, or there are choices: a run keeps its own.
-    """
-    if choices:
-        names = ", ".join(choices)
-        raise ValueError(f"a resumed run keeps its own settings; leave out {names}")
-    if folder is None:
-        return unfinished_run(task, out)
-    read_run(folder)
-    if is_finished(folder):
-        raise ValueError(f"the run in {str(folder)!r} is finished")
-    return folder
-
-
-def unfinished_run(task: str, out: Path) -> Path:
-    """The newest run of a task under ``out`` that is not finished, or ``ValueError`` if there is none."""
-    found = unfinished_runs(task, out)
-    if not found:
-        raise ValueError(
-            f"there is no unfinished training of {task} under {str(out)!r}; start one without --resume"
-        )
-    return max(found, key=lambda folder: (folder / RUN_FILE).stat().st_mtime)
-
-
-def unfinished_runs(task: str, out: Path) -> list[Path]:
-    """The runs of a task under ``out`` that are not finished."""
-    env_id = env_id_of(task)
-    return [
-        path.parent
-        for path in out.glob(f"*/{RUN_FILE}")
-        if read_json(path).get("env_id") == env_id and not is_finished(path.parent)
-    ]
 
 
 def is_finished(folder: Path) -> bool:
@@ -205,7 +151,13 @@ def read_run(folder: Path) -> Training:
         raise ValueError(f"{str(folder / RUN_FILE)!r} is not a run's: {error}") from error
 
 
-def run(folder: Path, *, progress: bool = True, report: Report | None = None) -> Result:
+def read_log(folder: Path) -> TrainingLog:
+    """The episodes of a finished run, or ``ValueError``."""
+    seconds = float(read_json(folder / CARD_FILE)["training"]["seconds"])
+    return TrainingLog.read(folder / LOG_FILE, seconds)
+
+
+def run(folder: Path, *, progress: bool = True, report: Report | None = None) -> FinishedRun:
     """Train what a run's folder says, or go on with it, and leave there all that comes of it.
 
     Parameters
@@ -220,7 +172,8 @@ def run(folder: Path, *, progress: bool = True, report: Report | None = None) ->
         If the folder's files are damaged.
     """
     training = read_run(folder)
-    trained = algorithm_named(training.algorithm).train(
+    trained = train(
+        training.algorithm,
         training.env_id,
         training.settings,
         seed=training.seed,
@@ -234,12 +187,12 @@ def run(folder: Path, *, progress: bool = True, report: Report | None = None) ->
     )
     save(trained.policy, folder)
     _write_statistics(folder, trained.policy)
-    _write_log(folder, trained.log)
+    trained.log.write(folder / LOG_FILE)
     agents = _judged_agents(training, trained.policy)
     rows = _judge(training, agents, progress)
     _draw(folder, training, agents, trained.log, rows)
     write_json(folder / EVALUATION_FILE, rows_to_plain(rows))  # last: it marks the run as finished
-    return Result(folder, trained.policy, rows)
+    return FinishedRun(folder, trained.policy, rows)
 
 
 def _judged_agents(training: Training, policy: Policy) -> dict[str, Agent]:
@@ -249,9 +202,10 @@ def _judged_agents(training: Training, policy: Policy) -> dict[str, Agent]:
 
 
 def _judge(training: Training, agents: Mapping[str, Agent], progress: bool) -> list[Row]:
-    with progress_bar(training.episodes * len(agents), progress) as bar:
+    total = training.episodes * len(agents)
+    with tqdm(total=total, desc="evaluating", unit="episode", disable=not progress) as bar:
         return evaluate(
-            task_of(training.env_id),
+            training.task,
             agents,
             episodes=training.episodes,
             seed=EVALUATION,
@@ -267,11 +221,11 @@ def _draw(
     log: TrainingLog,
     rows: list[Row],
 ) -> None:
-    task = task_of(training.env_id)
-    title = f"{training.algorithm.upper()} on {task}, seed {training.seed}: {training.settings.steps:,} steps in {log.seconds:.0f} s"
-    save_learning_curve(log, rows, title, training.settings.steps, folder / CURVE_FILE)
+    steps = training.settings.steps
+    title = f"{training.algorithm.upper()} on {training.task}, seed {training.seed}: {steps:,} steps in {log.seconds:.0f} s"
+    save_learning_curve(log, rows, training.algorithm, title, steps, folder / CURVE_FILE)
     save_agents_footprints(
-        agents, task, folder / FOOTPRINTS_FILE,
+        agents, training.task, folder / FOOTPRINTS_FILE,
         seed=evaluation_seed(EVALUATION), options=training.options,
     )  # fmt: skip
 
@@ -286,37 +240,3 @@ def _write_statistics(folder: Path, policy: Policy) -> None:
             for name, m, v in zip(policy.card.layout.names, mean, variance, strict=True)
         },
     )
-
-
-def read_log(folder: Path) -> TrainingLog:
-    """The episodes of a finished run, or ``ValueError``."""
-    path = folder / LOG_FILE
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            header, *lines = csv.reader(file)
-        if tuple(header) != _LOG_COLUMNS:
-            raise ValueError(f"its columns must be {', '.join(_LOG_COLUMNS)}")
-        columns = list(zip(*lines, strict=True)) if lines else [()] * len(_LOG_COLUMNS)
-        steps, returns, lengths, survived = (np.array(column, dtype=float) for column in columns)
-        seconds = float(read_json(folder / CARD_FILE)["training"]["seconds"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"no episodes can be read from {str(path)!r}: {error}") from error
-    counts = (steps.astype(np.int64), returns, lengths.astype(np.int64), survived > 0.0)
-    return TrainingLog(*counts, seconds)
-
-
-def _write_log(folder: Path, log: TrainingLog) -> None:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_LOG_COLUMNS)
-    writer.writerows(
-        zip(
-            log.steps.tolist(),
-            log.returns.tolist(),
-            log.lengths.tolist(),
-            log.survived.astype(int).tolist(),
-            strict=True,
-        )
-    )
-    with written_whole(folder / LOG_FILE) as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")

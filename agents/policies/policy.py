@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import importlib.metadata
+import platform
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -10,9 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.agent import State
-from agents.observations import ObservationLayout
+from lean_yaw_env import __version__
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
+from lean_yaw_env.validation import require_choice
+
+from ..agent import State
+from ..observations import ObservationLayout
 
 Weights = Mapping[str, NDArray[np.float32]]
 
@@ -36,10 +42,22 @@ LOG_STD_LIMITS = (np.float32(-20.0), np.float32(2.0))
 """Bounds of a logarithm of a deviation that a layer gives, as in Stable-Baselines3's SAC."""
 
 
+_PACKAGES = ("numpy", "scipy", "numba", "gymnasium", "torch", "stable-baselines3")
+
+
+def package_versions() -> dict[str, str]:
+    """Versions of the packages that a result depends on; those that are not installed are left out."""
+    found = {"python": platform.python_version(), "lean-yaw-env": __version__}
+    for name in _PACKAGES:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            found[name] = importlib.metadata.version(name)
+    return found
+
+
 def require_algorithm(name: str) -> str:
     """The name of an algorithm, which may be no path, or ``ValueError``."""
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
-        raise ValueError(f"algorithm must be a lower-case word, as ppo, not {name!r}")
+        raise ValueError(f"algorithm must be a lower-case word, as ppo, got {name!r}")
     return name
 
 
@@ -73,12 +91,8 @@ class PolicyCard:
 
     def __post_init__(self) -> None:
         require_algorithm(self.algorithm)
-        if self.activation not in ACTIVATIONS:
-            raise ValueError(
-                f"activation must be one of {', '.join(ACTIVATIONS)}, not {self.activation!r}"
-            )
-        if self.output not in OUTPUTS:
-            raise ValueError(f"output must be one of {', '.join(OUTPUTS)}, not {self.output!r}")
+        require_choice("activation", self.activation, ACTIVATIONS)
+        require_choice("output", self.output, OUTPUTS)
 
 
 class Policy:
@@ -168,12 +182,12 @@ def _require_weights(weights: Weights, features: int) -> int:
     else:
         expected |= {"log_std.weight": (ACTION_SIZE, before), "log_std.bias": (ACTION_SIZE,)}
     if set(weights) != set(expected):
-        raise ValueError(f"weights must be {sorted(expected)}, not {sorted(weights)}")
+        raise ValueError(f"weights must be {sorted(expected)}, got {sorted(weights)}")
     for name, shape in expected.items():
         array = weights[name]
         if array.dtype != np.float32 or array.shape != shape:
             raise ValueError(
-                f"weight {name} must be float32 of shape {shape}, not {array.dtype} of shape {array.shape}"
+                f"weight {name} must be float32 of shape {shape}, got {array.dtype} of shape {array.shape}"
             )
         if not np.isfinite(array).all():
             raise ValueError(f"weight {name} must hold finite numbers only")

@@ -7,16 +7,14 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-import safetensors.numpy
-from safetensors import SafetensorError
-
-from agents.files import read_json, write_json
-from agents.observations import ObservationLayout
-from agents.policies.policy import Policy, PolicyCard, require_algorithm
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.files import written_whole
+from lean_yaw_env.extras import needs_extra
+from lean_yaw_env.files import read_json, write_json, written_whole
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.registration import ENV_IDS, NAMESPACE
+
+from ..observations import ObservationLayout
+from .policy import Policy, PolicyCard, require_algorithm
 
 CARD_FILE = "policy.json"
 WEIGHTS_FILE = "policy.safetensors"
@@ -52,7 +50,7 @@ def save(policy: Policy, folder: Path) -> None:
     """Write a policy into a folder, which is made if it is not there; each file whole, the weights first."""
     folder.mkdir(parents=True, exist_ok=True)
     card = policy.card
-    data = safetensors.numpy.save(policy.weights)
+    data = _safetensors().numpy.save(policy.weights)
     with written_whole(folder / WEIGHTS_FILE) as temporary:
         temporary.write_bytes(data)
     write_json(
@@ -99,6 +97,8 @@ def load(
     PolicyFileError
         If there is no policy, a file is damaged or not of this format, or it was trained for another environment or version, on
         other observations or by another algorithm.
+    gymnasium.error.DependencyNotInstalled
+        If safetensors is not installed.
     """
     name = str(source)
     if name.startswith(f"{NAMESPACE}/"):
@@ -172,7 +172,7 @@ def require_env_id(env_id: str) -> str:
             f"this package's environment is {versions[0]}, not {env_id}: their observations or rewards differ; "
             "train a policy anew or install the package that trained it"
         )
-    raise PolicyFileError(f"env_id must be one of {', '.join(ENV_IDS)}, not {env_id!r}")
+    raise PolicyFileError(f"env_id must be one of {', '.join(ENV_IDS)}, got {env_id!r}")
 
 
 def task_of(env_id: str) -> str:
@@ -210,7 +210,7 @@ def _changed(record: Any) -> dict[str, Any]:
 def _known(name: str, values: Any, record: type) -> dict[str, Any]:
     names = [field.name for field in fields(record)]
     if not isinstance(values, dict) or not set(values) <= set(names):
-        raise ValueError(f"{name} must hold {', '.join(names)} only, not {values!r}")
+        raise ValueError(f"{name} must hold {', '.join(names)} only, got {values!r}")
     return values
 
 
@@ -259,7 +259,16 @@ def _read_weights(path: Path, digest: str) -> dict[str, Any]:
         raise ValueError(f"{path.name} cannot be read: {error}") from error
     if hashlib.sha256(data).hexdigest() != digest:
         raise ValueError(f"{path.name} is not the file that {CARD_FILE} was written with")
+    library = _safetensors()
     try:
-        return safetensors.numpy.load(data)
-    except SafetensorError as error:
+        return library.numpy.load(data)
+    except library.SafetensorError as error:
         raise ValueError(f"{path.name} is damaged: {error}") from error
+
+
+def _safetensors() -> Any:
+    """The library, imported when a policy is read or written: other agents do without."""
+    with needs_extra("agents"):
+        import safetensors
+        import safetensors.numpy
+    return safetensors

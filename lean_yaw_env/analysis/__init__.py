@@ -1,6 +1,14 @@
-"""Gaits and their stability: stride map, limit cycles, modes, branches, maps, basins, demands."""
+"""Gaits and their stability: section maps, limit cycles, modes, branches, maps, basins, demands."""
 
-from lean_yaw_env.analysis.attraction import Disturbance, basin, largest_disturbance
+from lean_yaw_env.analysis.active_map import COMMAND_PARAMETERS, ActiveMap, planar_gait_rate
+from lean_yaw_env.analysis.attraction import (
+    Disturbance,
+    LargestPushes,
+    basin,
+    largest_disturbance,
+    largest_pushes,
+)
+from lean_yaw_env.analysis.closed_loop_map import ClosedLoopMap, ControlInterface
 from lean_yaw_env.analysis.contact import FloorDemand, StepDemand, floor_demand
 from lean_yaw_env.analysis.continuation import Branch, Event, continue_gait
 from lean_yaw_env.analysis.critical_speed import stable_speeds
@@ -11,16 +19,10 @@ from lean_yaw_env.analysis.limit_cycle import (
     find_gait,
     find_limit_cycle,
     find_passive_gaits,
-    planar_gait_rate,
 )
+from lean_yaw_env.analysis.passive_map import PassiveMap
 from lean_yaw_env.analysis.periodic import find_periodic_gait
-from lean_yaw_env.analysis.section_map import (
-    BODY_PARAMETERS,
-    COMMAND_PARAMETERS,
-    ActiveMap,
-    PassiveMap,
-    section_map_of,
-)
+from lean_yaw_env.analysis.section_map import BODY_PARAMETERS, SectionMap, section_map_of
 from lean_yaw_env.analysis.storage import load_dataset, save_dataset
 from lean_yaw_env.analysis.stride import StrideJacobian, stride_jacobian, stride_map
 
@@ -29,12 +31,16 @@ __all__ = [
     "COMMAND_PARAMETERS",
     "ActiveMap",
     "Branch",
+    "ClosedLoopMap",
+    "ControlInterface",
     "Disturbance",
     "Event",
     "FloorDemand",
+    "LargestPushes",
     "LimitCycle",
     "Mode",
     "PassiveMap",
+    "SectionMap",
     "StepDemand",
     "StrideJacobian",
     "basin",
@@ -45,6 +51,7 @@ __all__ = [
     "find_periodic_gait",
     "floor_demand",
     "largest_disturbance",
+    "largest_pushes",
     "load_dataset",
     "load_map",
     "modes",

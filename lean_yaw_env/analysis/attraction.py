@@ -1,54 +1,60 @@
-"""How far from its gait a walker may be put: basins of attraction, largest disturbances survived."""
+"""How far from its gait a walker may be put: basins of attraction, largest disturbances and pushes survived."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lean_yaw_env.analysis.limit_cycle import LimitCycle, find_limit_cycle
-from lean_yaw_env.analysis.many_walks import ENDINGS, walk_many
+from lean_yaw_env.analysis.many_walks import ENDINGS, SURVIVED, walk_many
 from lean_yaw_env.analysis.progress import Counter
-from lean_yaw_env.analysis.section_map import ActiveMap, PassiveMap, section_map_of
-from lean_yaw_env.analysis.storage import labelled, load_dataset, require_same, save_dataset
-from lean_yaw_env.errors import SolverError
-from lean_yaw_env.kernel.records import FAILED
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, QUARTER_TURN, Vector, require_number
+from lean_yaw_env.analysis.section_map import SectionMap, section_map_of
+from lean_yaw_env.analysis.storage import Progressing, labelled, require_axis
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, QUARTER_TURN, Vector
 from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.validation import require_choice, require_count, require_number
 from lean_yaw_env.walker import Walker
 
 if TYPE_CHECKING:
     import xarray
 
+PUSHED = ("stance_pitch_rate", "ankle_rate")
+"""Rates that a push changes, the first along the direction zero."""
+
 _CHUNK = 4096
-_SECTIONS = 64
-"""Sizes tried in one batch; each round narrows the bracket by as much."""
+_DISTURBANCES, _PUSHES = 64, 32
+"""Sizes tried at once of a disturbance and of a push; each round narrows the bracket by as much."""
 _BOUNDED = ("stance_pitch", "ankle_angle")
 """Angles that must stay within a right angle."""
 
 
 def basin(
-    walker: Walker | PassiveWalker,
+    walker: Walker | PassiveWalker | SectionMap,
     x: tuple[str, Sequence[float] | Vector],
     y: tuple[str, Sequence[float] | Vector],
     *,
+    centre: Vector | None = None,
     n_steps: int = 60,
     inter_leg_angle: float = INTER_LEG_ANGLE,
     mass_offset: float | tuple[float, float] = 0.0,
     path: str | Path | None = None,
     progress: bool = False,
 ) -> xarray.Dataset:
-    """Walk from every point of a plane of the section through the gait.
+    """Walk from every point of a plane of the section.
 
     Parameters
     ----------
-    walker : Walker or PassiveWalker
+    walker : Walker, PassiveWalker or SectionMap
     x, y : (name, values)
-        Two coordinates of the section state with their values; the others are the gait's.
+        Two coordinates of the state with their values; the others are the centre's.
+    centre : shape (k,), optional
+        A state in the plane; by default the gait's. With it no gait is looked for.
     n_steps : int >= 1
         A walk of so many steps counts as survived. A fall comes within some ten of them; how long
         the way back takes is in the multipliers.
@@ -61,8 +67,8 @@ def basin(
     -------
     xarray.Dataset
         Over x and y: ``steps`` completed, ``ending`` (0 survived, otherwise how it fell, see the
-        variable's ``meanings``), ``distance`` of the last state from the gait (largest coordinate
-        of the free ones, mirrored to the left foot). Attribute ``gait``: the section state.
+        variable's ``meanings``), and without a ``centre`` the ``distance`` of the last state from the gait (largest
+        coordinate of the free ones, on the foot that stands). Attribute ``centre``: the state by coordinate, as JSON.
 
     Raises
     ------
@@ -71,38 +77,46 @@ def basin(
     NoGaitError
         If there is no gait.
     """
-    require_number("n_steps", n_steps, 1, 1_000_000)
+    require_count("n_steps", n_steps, 1, 1_000_000)
     section_map = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
-    cycle = find_limit_cycle(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
+    cycle = find_limit_cycle(section_map) if centre is None else None
+    middle = section_map.require_state(centre if cycle is None else cycle.state)
     axes = {name: _axis(section_map, name, values) for name, values in (x, y)}
     if len(axes) != 2:
-        raise ValueError(f"x and y must be different coordinates, not {x[0]!r} twice")
-    states = np.tile(cycle.state, (axes[x[0]].size * axes[y[0]].size, 1))
-    grid = np.meshgrid(axes[x[0]], axes[y[0]], indexing="ij")
-    for name, values in zip(axes, grid, strict=True):
-        states[:, section_map.names.index(name)] = values.ravel()
+        raise ValueError(f"x and y must be different coordinates, got {x[0]!r} twice")
+    states = plane(section_map, middle, axes)
     n = len(states)
-    result = {"steps": np.zeros(n), "ending": np.full(n, -1.0), "distance": np.full(n, np.nan)}
-    fresh = _dataset(section_map, axes, result, cycle, n_steps)
-    if path is not None and Path(path).exists():
-        stored = load_dataset(path)
-        require_same(stored, fresh, path)
-        result = {name: stored[name].to_numpy().ravel().copy() for name in result}
-    with Counter("basin", progress, n) as counter:
+    result: dict[str, Vector] = {"steps": np.zeros(n), "ending": np.full(n, -1.0)}
+    if cycle is not None:
+        result["distance"] = np.full(n, np.nan)
+
+    def dataset() -> xarray.Dataset:
+        return _dataset(section_map, axes, result, middle, n_steps)
+
+    saved = Progressing(path, dataset)
+    saved.resume(result)
+    with saved, Counter("basin", progress, n) as counter:
         waiting = np.flatnonzero(result["ending"] < 0.0)
         counter.advance(n - waiting.size)
         for first in range(0, waiting.size, _CHUNK):
             some = waiting[first : first + _CHUNK]
-            walks = walk_many(section_map, states[some], int(n_steps))
+            walks = walk_many(section_map, states[some], n_steps)
             result["steps"][some] = walks.steps
             result["ending"][some] = walks.endings
-            result["distance"][some] = _distance(
-                section_map, walks.states, walks.steps.tolist(), cycle
-            )
+            if cycle is not None:
+                result["distance"][some] = _distance(cycle, walks.states, walks.steps)
             counter.advance(some.size)
-            if path is not None:
-                save_dataset(_dataset(section_map, axes, result, cycle, n_steps), path)
-    return _dataset(section_map, axes, result, cycle, n_steps)
+            saved.save_if_due()
+    return dataset()
+
+
+def plane(section_map: SectionMap, centre: Vector, axes: dict[str, Vector]) -> Vector:
+    """States (n, k) over a grid of two coordinates' values, the others those of ``centre``; the second coordinate runs fastest."""
+    grid = np.meshgrid(*axes.values(), indexing="ij")
+    states = np.tile(centre, (grid[0].size, 1))
+    for name, values in zip(axes, grid, strict=True):
+        states[:, section_map.names.index(name)] = values.ravel()
+    return states
 
 
 @dataclass(frozen=True)
@@ -133,7 +147,7 @@ class Disturbance:
 
 
 def largest_disturbance(
-    walker: Walker | PassiveWalker,
+    walker: Walker | PassiveWalker | SectionMap,
     coordinate: str,
     *,
     upward: bool = True,
@@ -148,7 +162,7 @@ def largest_disturbance(
 
     Parameters
     ----------
-    walker : Walker or PassiveWalker
+    walker : Walker, PassiveWalker or SectionMap
     coordinate : name of a section coordinate
     upward : bool
         Whether to add to the coordinate. With ``relative``, to its magnitude: +100 % doubles it.
@@ -173,10 +187,9 @@ def largest_disturbance(
     """
     require_number("most", most, 0.0, 1e6, "(]")
     require_number("tolerance", tolerance, 0.0, most, "(]")
-    require_number("n_steps", n_steps, 1, 1_000_000)
     section_map = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
     index = _index(section_map, coordinate)
-    cycle = find_limit_cycle(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
+    cycle = find_limit_cycle(section_map)
     value = float(cycle.state[index])
     if relative and value == 0.0:
         raise ValueError(f"{coordinate} is 0 in the gait: ask for an absolute disturbance")
@@ -185,82 +198,145 @@ def largest_disturbance(
     if coordinate in _BOUNDED:
         room = QUARTER_TURN - (value if unit > 0.0 else -value)
         reach = min(most, 0.999 * room / abs(unit))
-    low, high, fall = 0.0, reach, ""
-    while True:
-        sizes = low + (high - low) * np.arange(1, _SECTIONS + 1) / _SECTIONS
-        states = np.tile(cycle.state, (sizes.size, 1))
-        states[:, index] += sizes * unit
-        walks = walk_many(section_map, states, int(n_steps))
-        if np.any(walks.endings == FAILED):
-            bad = states[np.argmax(walks.endings == FAILED)].tolist()
-            raise SolverError(f"the walk from {bad} of {walker.parameters} did not converge")
-        fallen = np.flatnonzero(~walks.survived)
-        if not fallen.size:
-            low = high
-            break
-        first = int(fallen[0])
-        fall = ENDINGS[float(walks.endings[first])]
-        high = float(sizes[first])
-        low = float(sizes[first - 1]) if first else low
-        if high - low <= tolerance:
-            break
-    largest = low * unit
+    ways = np.zeros((1, len(cycle.state)))
+    ways[0, index] = unit
+    sizes, endings = _largest_survived(
+        section_map, cycle.state, ways, reach, tolerance, _DISTURBANCES, n_steps
+    )
+    largest, ending = float(sizes[0]) * unit, float(endings[0])
     return Disturbance(
         coordinate=coordinate,
         gait_value=value,
         largest=largest,
         relative=largest / value if value != 0.0 else float("nan"),
-        is_limited=bool(fall),
-        fall=fall,
+        is_limited=ending != SURVIVED,
+        fall=ENDINGS[ending] if ending != SURVIVED else "",
     )
 
 
-def _index(section_map: ActiveMap | PassiveMap, coordinate: str) -> int:
-    names = [section_map.names[i] for i in section_map.free]
-    if coordinate not in names:
-        raise ValueError(f"coordinate must be one of {', '.join(names)}; not {coordinate!r}")
+@dataclass(frozen=True)
+class LargestPushes:
+    """The largest pushes that a gait survives, by direction.
+
+    Attributes
+    ----------
+    angles : shape (n,)
+        rad; zero adds to the stance pitch rate (it is negative: slows the walker), a quarter turn to the ankle rate.
+    sizes : shape (n,)
+        All smaller ones tried are survived; rad / time unit.
+    is_limited : bool, shape (n,)
+        Whether a larger one fells the walker; otherwise ``sizes`` is as far as was looked.
+    tolerance : float
+        To which sizes are known.
+    """
+
+    angles: Vector
+    sizes: Vector
+    is_limited: NDArray[np.bool_]
+    tolerance: float
+
+
+def largest_pushes(
+    cycle: LimitCycle, *, directions: int = 24, most: float = 1.6, n_steps: int = 60
+) -> LargestPushes:
+    """Push the rates at the start of a left step of a gait, in every direction ever harder, until the walker falls.
+
+    Parameters
+    ----------
+    cycle : LimitCycle
+    directions : int >= 1
+        All round, evenly, from the direction zero.
+    most : float > 0
+        How far to look, rad / time unit.
+    n_steps : int >= 1
+        A walk of so many steps counts as survived.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+    SolverError
+        If the integrator fails.
+    """
+    require_count("directions", directions, 1, 3600)
+    require_number("most", most, 0.0, 100.0, "(]")
+    angles = 2.0 * np.pi * np.arange(directions) / directions
+    ways = push_ways(cycle.section_map, angles)
+    tolerance = most / _PUSHES**2
+    sizes, endings = _largest_survived(
+        cycle.section_map, cycle.state, ways, most, tolerance, _PUSHES, n_steps
+    )
+    return LargestPushes(angles, sizes, endings != SURVIVED, tolerance)
+
+
+def push_ways(section_map: SectionMap, angles: Vector) -> Vector:
+    """Changes (n, k) of a state by pushes of size one in directions (n,)."""
+    ways = np.zeros((len(angles), len(section_map.names)))
+    for name, share in zip(PUSHED, (np.cos(angles), np.sin(angles)), strict=True):
+        ways[:, section_map.names.index(name)] = share
+    return ways
+
+
+def _largest_survived(
+    section_map: SectionMap,
+    state: Vector,
+    ways: Vector,
+    most: float,
+    tolerance: float,
+    sections: int,
+    n_steps: int,
+) -> tuple[Vector, Vector]:
+    """How far a state may be moved along each of the ways (n, k), and how the walk from a little farther ends (0 where nothing falls).
+
+    A scan finds the first of some sizes at which the walker falls; further ones narrow that bracket until it is as small as the tolerance.
+    """
+    low, width = np.zeros(len(ways)), most
+    endings = np.zeros(len(ways))
+    going = np.arange(len(ways))
+    is_first = True
+    while going.size and (is_first or width > tolerance):
+        sizes = low[going, None] + width * np.arange(1, sections + 1) / sections
+        states = state + sizes[:, :, None] * ways[going, None, :]
+        walks = walk_many(section_map, states.reshape(-1, state.size), n_steps).require_solved()
+        ended = walks.endings.reshape(going.size, sections)
+        falls = ended != SURVIVED
+        falls[:, -1] |= not is_first  # the bracket's end, but for rounding
+        is_limited = falls.any(axis=1)
+        low[going[~is_limited]] = most
+        going, first, ended = going[is_limited], falls[is_limited].argmax(axis=1), ended[is_limited]
+        width /= sections
+        low[going] += first * width
+        found = np.take_along_axis(ended, first[:, None], axis=1)[:, 0]
+        endings[going] = np.where(found != SURVIVED, found, endings[going])
+        is_first = False
+    return low, endings
+
+
+def _index(section_map: SectionMap, coordinate: str) -> int:
+    require_choice("coordinate", coordinate, [section_map.names[i] for i in section_map.free])
     return section_map.names.index(coordinate)
 
 
-def _axis(
-    section_map: ActiveMap | PassiveMap, name: str, values: Sequence[float] | Vector
-) -> Vector:
+def _axis(section_map: SectionMap, name: str, values: Sequence[float] | Vector) -> Vector:
     _index(section_map, name)
-    array = np.asarray(values, dtype=float)
-    if array.ndim != 1 or array.size == 0 or np.any(np.diff(array) <= 0.0):
-        raise ValueError(f"values of {name} must be growing numbers, not {values!r}")
     bound = QUARTER_TURN if name in _BOUNDED else 1e6
-    if not np.all(np.abs(array) < bound):
-        raise ValueError(f"values of {name} must be in ({-bound:g}, {bound:g}), not {values!r}")
-    return array
+    return require_axis(f"values of {name}", values, -bound, bound)
 
 
-def _distance(
-    section_map: ActiveMap | PassiveMap, states: Vector, steps: Sequence[int], cycle: LimitCycle
-) -> Vector:
+def _distance(cycle: LimitCycle, states: Vector, steps: NDArray[np.int64]) -> Vector:
     """From the gait on the foot that stands, in the free coordinates."""
-    standing = {0: cycle.state, 1: section_map.over(2).results(cycle.state)[0].state}
-    goals = np.array([standing[int(k) % 2] for k in steps])
-    return np.abs(states - goals)[:, section_map.free].max(axis=1)
+    on_foot = np.array([cycle.state, cycle.steps[0].state])
+    return np.abs(states - on_foot[steps % 2])[:, cycle.section_map.free].max(axis=1)
 
 
 def _dataset(
-    section_map: ActiveMap | PassiveMap,
+    section_map: SectionMap,
     axes: dict[str, Vector],
     result: dict[str, Vector],
-    cycle: LimitCycle,
+    centre: Vector,
     n_steps: int,
 ) -> xarray.Dataset:
     shape = tuple(axis.size for axis in axes.values())
-    question = {
-        "walker": type(section_map.walker).__name__,
-        "parameters": asdict(section_map.walker.parameters),
-        "n_steps": int(n_steps),
-        "command": [section_map.inter_leg_angle, *section_map.mass_offset]
-        if isinstance(section_map, ActiveMap)
-        else [],
-        "planar": isinstance(section_map, PassiveMap) and section_map.walker.planar,
-    }
     meanings = {"meanings": json.dumps({str(int(k)): text for k, text in ENDINGS.items()})}
     return labelled().Dataset(
         {
@@ -269,7 +345,7 @@ def _dataset(
         },
         coords=axes,
         attrs={
-            "question": json.dumps(question, sort_keys=True),
-            "gait": json.dumps(cycle.state.round(12).tolist()),
+            "question": json.dumps({**section_map.question(), "n_steps": n_steps}, sort_keys=True),
+            "centre": json.dumps(dict(zip(section_map.names, centre.round(12).tolist(), strict=True))),
         },
     )

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from lean_yaw_env.analysis.limit_cycle import find_limit_cycle
-from lean_yaw_env.analysis.section_map import ActiveMap, section_map_of
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector, require_number
+from lean_yaw_env.analysis.section_map import SectionMap
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, STATE_SIZE, Foot, Vector
 from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.validation import require_count
 from lean_yaw_env.walker import Walker
 
 
@@ -35,17 +36,17 @@ class StepDemand:
 
 @dataclass(frozen=True)
 class FloorDemand:
-    """Over the two steps of a stride.
+    """Over the steps of a cycle, two of them but for a gait that repeats after more.
 
     Attributes
     ----------
-    steps : two StepDemand
-        On the left and on the right foot.
+    steps : tuple of StepDemand
+        On the left and on the right foot by turns.
     least_normal_force, greatest_normal_force, greatest_friction, greatest_yaw_torque : float
         The last by magnitude.
     """
 
-    steps: tuple[StepDemand, StepDemand]
+    steps: tuple[StepDemand, ...]
     least_normal_force: float
     greatest_normal_force: float
     greatest_friction: float
@@ -53,7 +54,7 @@ class FloorDemand:
 
 
 def floor_demand(
-    walker: Walker | PassiveWalker,
+    walker: Walker | PassiveWalker | SectionMap,
     *,
     inter_leg_angle: float = INTER_LEG_ANGLE,
     mass_offset: float | tuple[float, float] = 0.0,
@@ -65,7 +66,7 @@ def floor_demand(
 
     Parameters
     ----------
-    walker : Walker or PassiveWalker
+    walker : Walker, PassiveWalker or SectionMap
         A passive walker's swing leg is massless and asks nothing of the floor.
     inter_leg_angle, mass_offset : see ``find_limit_cycle``
     samples : int >= 2
@@ -78,41 +79,28 @@ def floor_demand(
     ValueError
         If an argument is outside its range.
     """
-    require_number("samples", samples, 2, 1_000_000)
+    require_count("samples", samples, 2, 1_000_000)
     cycle = find_limit_cycle(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
-    section_map = section_map_of(
-        walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset, n_steps=2
-    )
-    results = section_map.results(cycle.state)
-    starts = (cycle.state, results[0].state)
-    offsets = section_map.mass_offset if isinstance(section_map, ActiveMap) else (0.0, 0.0)
-    stander = walker if isinstance(walker, Walker) else Walker(walker.moving_parameters)
-    feet: tuple[Foot, Foot] = ("left", "right")
-    steps = []
-    for k in range(2):
+    stander = cycle.section_map.stander
+    demands = []
+    for step in cycle.steps:
+        angle, offset, before = step.command
         motion = stander.stance_motion(
-            starts[k][:5],
-            duration=results[k].duration,
+            step.start[:STATE_SIZE],
+            duration=step.duration,
             samples=samples,
-            stance=feet[k],
-            inter_leg_angle=inter_leg_angle,
-            mass_offset=offsets[k],
-            previous_offset=offsets[1 - k],
+            stance=step.foot,
+            inter_leg_angle=angle,
+            mass_offset=offset,
+            previous_offset=before,
         )
-        steps.append(
-            StepDemand(
-                stance=feet[k],
-                time=motion["time"],
-                normal_force=motion["normal_force"],
-                friction_demand=motion["friction_demand"],
-                yaw_torque=motion["yaw_torque"],
-            )
-        )
-    normal = np.concatenate([step.normal_force for step in steps])
+        named = {name: motion[name] for name in ("time", "normal_force", "friction_demand", "yaw_torque")}
+        demands.append(StepDemand(stance=step.foot, **named))
+    normal = np.concatenate([demand.normal_force for demand in demands])
     return FloorDemand(
-        steps=(steps[0], steps[1]),
+        steps=tuple(demands),
         least_normal_force=float(normal.min()),
         greatest_normal_force=float(normal.max()),
-        greatest_friction=float(max(step.friction_demand.max() for step in steps)),
-        greatest_yaw_torque=float(max(np.abs(step.yaw_torque).max() for step in steps)),
+        greatest_friction=float(max(demand.friction_demand.max() for demand in demands)),
+        greatest_yaw_torque=float(max(np.abs(demand.yaw_torque).max() for demand in demands)),
     )

@@ -19,17 +19,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from lean_yaw_env.analysis.limit_cycle import LimitCycle, cycle_at, find_limit_cycle
-from lean_yaw_env.analysis.progress import Counter
-from lean_yaw_env.analysis.section_map import (
-    ActiveMap,
-    PassiveMap,
-    require_left_state,
-    section_map_of,
+from lean_yaw_env.analysis.fixed_point import least_change
+from lean_yaw_env.analysis.limit_cycle import (
+    LimitCycle,
+    cycle_at,
+    find_limit_cycle,
+    sorted_eigenvalues,
+    spectral_radii,
 )
+from lean_yaw_env.analysis.progress import Counter
+from lean_yaw_env.analysis.section_map import SectionMap, section_map_of
 from lean_yaw_env.errors import LeanYawError, NoGaitError
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector, require_number
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector
 from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.validation import require_count, require_number
 from lean_yaw_env.walker import Walker
 
 EventKind = Literal["fold", "real +1", "real -1", "complex pair"]
@@ -56,7 +59,7 @@ class Event:
         A fold is a real +1 where the branch turns back in the parameter.
     value : float
         Of the parameter.
-    state : shape (5,) or (6,)
+    state : shape (k,)
     eigenvalue : complex
         The multiplier on the unit circle, of the branch's map.
     is_leaving : bool
@@ -79,14 +82,14 @@ class Branch:
     parameter : str
     values : shape (n,)
         Of the parameter; not monotonic past a fold.
-    states : shape (n, 5) or (n, 6)
+    states : shape (n, k)
     eigenvalues : shape (n, m), complex
         Of the map over ``n_steps``: mirrored steps for a symmetric gait, by falling magnitude.
     n_steps : int
     events : tuple of Event
     ended : str
         Why the branch ends.
-    section_map : ActiveMap or PassiveMap
+    section_map : SectionMap
         The map at the start of the branch.
     """
 
@@ -97,12 +100,12 @@ class Branch:
     n_steps: int
     events: tuple[Event, ...]
     ended: str
-    section_map: ActiveMap | PassiveMap
+    section_map: SectionMap
 
     @property
     def is_stable(self) -> NDArray[np.bool_]:
         """Whether the gait at each point is stable, shape (n,)."""
-        return np.abs(self.eigenvalues).max(axis=1) < 1.0
+        return spectral_radii(self.eigenvalues, self.section_map.neutral_within) < 1.0
 
     def cycle(self, index: int) -> LimitCycle:
         """The gait at a point of the branch."""
@@ -111,7 +114,7 @@ class Branch:
 
 
 def continue_gait(
-    walker: Walker | PassiveWalker,
+    walker: Walker | PassiveWalker | SectionMap,
     parameter: str,
     limits: tuple[float, float],
     *,
@@ -128,13 +131,13 @@ def continue_gait(
 
     Parameters
     ----------
-    walker : Walker or PassiveWalker
+    walker : Walker, PassiveWalker or SectionMap
         Where the branch starts.
     parameter : str
-        One of ``BODY_PARAMETERS``, or for the active walker ``COMMAND_PARAMETERS``.
+        One of the map's ``parameters``: of any map ``BODY_PARAMETERS``, of the active walker ``COMMAND_PARAMETERS`` too.
     limits : (low, high)
         Interval of the parameter, which holds its value at the start.
-    state : shape (5,) or (6,), optional
+    state : shape (k,), optional
         A gait's section state to start from; by default ``find_limit_cycle``'s.
     n_steps : int, optional
         Steps until ``state`` recurs; by default the fewest for a simple gait.
@@ -154,19 +157,14 @@ def continue_gait(
     ValueError
         If an argument is outside its range.
     """
-    if parameter == "mass_offset" and n_steps is None:
-        n_steps = 2  # the same offset for both feet, but for none, is no mirror image of itself
-    section_map = section_map_of(
-        walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset, n_steps=n_steps
-    )
+    simple = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
+    section_map = simple.along(parameter) if n_steps is None else simple.over(n_steps)
     low, high = _require_limits(limits, parameter, section_map.value(parameter))
     require_number("longest_step", longest_step, 0.0, 1.0, "(]")
-    require_number("most_points", most_points, 2, 1_000_000)
-    if state is None:
-        state = find_limit_cycle(
-            walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset
-        ).state
-    curve = _Curve(section_map, parameter, require_left_state(section_map, state), high - low)
+    require_count("most_points", most_points, 2, 1_000_000)
+    start = find_limit_cycle(simple).state if state is None else section_map.require_state(state)
+    neutral = np.abs(cycle_at(section_map, start).eigenvalues - 1.0) < section_map.neutral_within
+    curve = _Curve(section_map, parameter, start, high - low, int(neutral.sum()))
     point = curve.start(1.0 if upward else -1.0)
     points, events = [point], []
     step, ended = min(_FIRST_STEP, longest_step), "the asked number of points"
@@ -201,6 +199,8 @@ class _Point:
     place: Vector
     tangent: Vector
     eigenvalues: NDArray[np.complex128]
+    answering: NDArray[np.complex128]
+    """The eigenvalues without those that are neutral all along the branch."""
     iterations: int
     limit: float | None = None
     """The parameter's value, where it is a limit that rounding must not pass."""
@@ -210,14 +210,23 @@ class _Point:
 class _Curve:
     """The scaled curve of fixed points in the space of free coordinates and parameter."""
 
-    section_map: ActiveMap | PassiveMap
+    section_map: SectionMap
     parameter: str
     template: Vector
     parameter_scale: float
+    neutral: int
+    """How many multipliers are neutral wherever the gait is."""
 
     @property
     def scales(self) -> Vector:
         return np.append(np.full(len(self.section_map.free), STATE_SCALE), self.parameter_scale)
+
+    @property
+    def residual_limit(self) -> float:
+        return max(_RESIDUAL, self.section_map.precision)
+
+    def _solved(self, bordered: Vector, wanted: Vector) -> Vector:
+        return least_change(bordered, wanted, self.section_map.precision)
 
     def value(self, point: _Point) -> float:
         return float(point.place[-1] * self.parameter_scale) if point.limit is None else point.limit
@@ -260,15 +269,20 @@ class _Curve:
         for iteration in range(_NEWTON_STEPS):
             residual, slope, own = self.equations(place, limit)
             bordered = np.vstack([slope, along])
-            if iteration > 0 and float(np.abs(residual).max()) < _RESIDUAL:
-                tangent = np.linalg.solve(bordered, np.append(np.zeros(residual.size), 1.0))
-                eigenvalues = np.asarray(np.linalg.eigvals(own), dtype=complex)
-                order = np.lexsort((-np.imag(eigenvalues), -np.abs(eigenvalues)))
+            if iteration > 0 and float(np.abs(residual).max()) < self.residual_limit:
+                tangent = self._solved(bordered, np.append(np.zeros(residual.size), 1.0))
+                eigenvalues = sorted_eigenvalues(own)
+                nearest_one = np.argsort(np.abs(eigenvalues - 1.0), kind="stable")
                 return _Point(
-                    place, tangent / np.linalg.norm(tangent), eigenvalues[order], iteration, limit
+                    place=place,
+                    tangent=tangent / np.linalg.norm(tangent),
+                    eigenvalues=eigenvalues,
+                    answering=eigenvalues[np.sort(nearest_one[self.neutral :])],
+                    iterations=iteration,
+                    limit=limit,
                 )
             miss = np.append(residual, along @ (place - anchor))
-            place = place - np.linalg.solve(bordered, miss)
+            place = place - self._solved(bordered, miss)
         raise NoGaitError("Newton's method does not reach the branch")
 
     def beyond(self, point: _Point, length: float) -> _Point:
@@ -315,17 +329,18 @@ def _fold_test(point: _Point) -> float:
 
 
 def _plus_test(point: _Point) -> float:
-    return float(np.real(np.prod(point.eigenvalues - 1.0)))
+    return float(np.real(np.prod(point.answering - 1.0)))
 
 
 def _minus_test(point: _Point) -> float:
-    return float(np.real(np.prod(point.eigenvalues + 1.0)))
+    return float(np.real(np.prod(point.answering + 1.0)))
 
 
 def _pair_test(point: _Point) -> float:
     """The product over all pairs of (product of the two, less one): zero for a pair on the circle."""
-    first, second = np.triu_indices(point.eigenvalues.size, 1)
-    return float(np.real(np.prod(point.eigenvalues[first] * point.eigenvalues[second] - 1.0)))
+    values = point.answering
+    first, second = np.triu_indices(values.size, 1)
+    return float(np.real(np.prod(values[first] * values[second] - 1.0)))
 
 
 _TESTS: tuple[tuple[EventKind, Callable[[_Point], float], complex], ...] = (
@@ -361,7 +376,7 @@ def _events(curve: _Curve, point: _Point, following: _Point) -> list[Event]:
             for at, other in found
         ):
             continue  # a fold is a real +1 already
-        outside = [int((np.abs(p.eigenvalues) > 1.0).sum()) for p in (point, following)]
+        outside = [int((np.abs(p.answering) > 1.0).sum()) for p in (point, following)]
         event = Event(
             kind, curve.value(place), curve.state(place.place), eigenvalue, outside[1] > outside[0]
         )
@@ -371,7 +386,7 @@ def _events(curve: _Curve, point: _Point, following: _Point) -> list[Event]:
 
 def _critical(point: _Point, kind: EventKind, circle: complex) -> complex | None:
     """The multiplier on the circle; None for two real ones whose product is one."""
-    values = point.eigenvalues
+    values = point.answering
     if kind != "complex pair":
         return complex(values[np.argmin(np.abs(values - circle))])
     upper = values[np.imag(values) > _NOT_REAL]
@@ -385,7 +400,7 @@ def _require_limits(
 ) -> tuple[float, float]:
     low, high = (float(limit) for limit in limits)
     if not low < high:
-        raise ValueError(f"limits must be (low, high) with low < high, not {limits!r}")
+        raise ValueError(f"limits must be (low, high) with low < high, got {limits!r}")
     if not low <= value <= high:
-        raise ValueError(f"limits {limits!r} must hold the start's {parameter}, {value:g}")
+        raise ValueError(f"limits must hold the start's {parameter}, {value:g}, got {limits!r}")
     return low, high

@@ -13,19 +13,19 @@ axis is vertical at heel strike, which makes the strike forget the lean.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
 from lean_yaw_env.analysis.limit_cycle import LimitCycle
-
-LATERAL = ("heading", "ankle_angle", "ankle_rate")
-"""Coordinates that only a three-dimensional motion moves."""
+from lean_yaw_env.analysis.section_map import Motion
 
 ZERO = 1e-6
 """A multiplier below this is zero but for round-off: its disturbance is gone within a cycle."""
+_NO_PART = 1e-9
+"""Participation factors that sum to less say nothing: left and right eigenvector of a multiple eigenvalue are square to each other."""
 
 ModeName = Literal["fore-aft", "three-dimensional"]
 
@@ -38,24 +38,33 @@ class Mode:
     ----------
     eigenvalue : complex
         Its multiplier over the cycle.
+    error : float
+        Of the eigenvalue, to first order, from what the Jacobian leaves uncertain; zero where that is exact, infinite for a multiple one.
     vector : shape (n,), complex
         Right eigenvector in the gait's ``coordinates``, of unit length.
     left_vector : shape (n,)
         Left eigenvector: the combination of coordinates that the mode multiplies.
     name : "fore-aft" or "three-dimensional"
     lateral_share : float in [0, 1]
-        Of heading, ankle angle and ankle rate in it.
+        Of all but the fore-aft motion in it.
+    about : "heading", "lean", "pitch" or "masses"
+        The motion that takes the largest part in it; "pitch" is the fore-aft one.
     is_zero : bool
+    is_neutral : bool
+        Whether it multiplies by one, as nothing answers to what it moves.
     explanation : str
         For a zero one, why; otherwise empty.
     """
 
     eigenvalue: complex
+    error: float
     vector: NDArray[np.complex128]
     left_vector: NDArray[np.complex128]
     name: ModeName
     lateral_share: float
+    about: Motion
     is_zero: bool
+    is_neutral: bool
     explanation: str
 
 
@@ -72,42 +81,47 @@ def modes(cycle: LimitCycle) -> tuple[Mode, ...]:
         As many as ``cycle.eigenvalues``.
     """
     values, left, right = _eigen(cycle.jacobian)
-    lateral = np.isin(cycle.coordinates, LATERAL)
-    found = []
-    for value, backward, forward in zip(values, left.T, right.T, strict=True):
-        factors = np.abs(np.conj(backward) * forward)
-        weights = factors if factors.sum() > 1e-12 else np.abs(forward) ** 2
-        share = float(weights[lateral].sum() / weights.sum())
-        is_zero = bool(abs(value) < ZERO)
-        found.append(
-            Mode(
-                eigenvalue=complex(value),
-                vector=forward.astype(complex),
-                left_vector=np.conj(backward).astype(complex),
-                name="three-dimensional" if share > 0.5 else "fore-aft",
-                lateral_share=share,
-                is_zero=is_zero,
-                explanation=_explanation(cycle.coordinates) if is_zero else "",
-            )
-        )
+    found = [
+        _mode(cycle, complex(value), np.conj(backward), forward)
+        for value, backward, forward in zip(values, left.T, right.T, strict=True)
+    ]
     return tuple(sorted(found, key=lambda mode: (-abs(mode.eigenvalue), -mode.eigenvalue.imag)))
+
+
+def _mode(
+    cycle: LimitCycle,
+    value: complex,
+    left: NDArray[np.complex128],
+    right: NDArray[np.complex128],
+) -> Mode:
+    factors = np.abs(left * right)
+    weights = factors if factors.sum() > _NO_PART else np.abs(right) ** 2
+    section_map = cycle.section_map
+    of_name = dict(zip(section_map.names, section_map.motions, strict=True))
+    motions = np.array([of_name[name] for name in cycle.coordinates])
+    shares = {each: float(weights[motions == each].sum() / weights.sum()) for each in _MOTIONS}
+    lateral = 1.0 - shares["pitch"]
+    is_zero = abs(value) < ZERO
+    bound = float(np.abs(left) @ cycle.jacobian_error @ np.abs(right))
+    overlap = float(abs(left @ right))
+    return Mode(
+        eigenvalue=value,
+        error=0.0 if bound == 0.0 else bound / overlap if overlap > 0.0 else float("inf"),
+        vector=right.astype(complex),
+        left_vector=left.astype(complex),
+        name="three-dimensional" if lateral > 0.5 else "fore-aft",
+        lateral_share=lateral,
+        about=max(_MOTIONS, key=lambda each: shares[each]),
+        is_zero=is_zero,
+        is_neutral=abs(value - 1.0) < section_map.neutral_within,
+        explanation=section_map.zero_explanation if is_zero else "",
+    )
+
+
+_MOTIONS: tuple[Motion, ...] = get_args(Motion)
 
 
 def _eigen(matrix: NDArray[np.float64]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Eigenvalues, left and right eigenvectors (columns)."""
     values, left, right = linalg.eig(matrix, left=True, right=True)  # pyright: ignore[reportAssignmentType]
     return values, left, right
-
-
-def _explanation(coordinates: tuple[str, ...]) -> str:
-    if "inter_leg_rate" in coordinates:
-        return (
-            "swing rate: the swing foot's mass acts on nothing, and at heel strike the new swing "
-            "foot's momentum follows from the stance leg's pose and rates, so that the state after "
-            "a strike has one freedom less than the section"
-        )
-    return (
-        "section: the swing leg is held at a fixed angle, and two legs at a fixed angle with both "
-        "feet on the floor determine the stance pitch from the ankle angle, so that the state "
-        "after a strike has one freedom less than the section"
-    )

@@ -8,12 +8,16 @@ from typing import TypeVar
 import numpy as np
 from scipy.optimize import root
 
-from lean_yaw_env.analysis.section_map import SectionMap
+from lean_yaw_env.analysis.section_map import RESIDUAL_LIMIT, SectionMap
 from lean_yaw_env.errors import LeanYawError, NoGaitError
 from lean_yaw_env.parameters import Vector
 
-RESIDUAL_LIMIT = 1e-12
-"""Largest change of any coordinate over the map that still counts as a fixed point."""
+__all__ = ["RESIDUAL_LIMIT", "follow_fixed_point", "least_change", "side_of_folds", "solve_fixed_point"]
+
+_NEWTON_STEPS = 30
+_SHARES = (1.0, 0.5, 0.25, 0.125)
+"""Of Newton's step, tried in turn."""
+_ROUND_OFF = 1e-16
 _FIRST_PIECE = 0.25
 _SMALLEST_PIECE = 1.0 / 256.0
 
@@ -26,17 +30,73 @@ def solve_fixed_point(section_map: SectionMap, guess: Vector, *, exact: bool = T
     Parameters
     ----------
     section_map : SectionMap
-    guess : shape (5,) or (6,)
+    guess : shape (k,)
         Coordinates that are not free stay as they are.
     exact : bool
-        With the exact Jacobian; otherwise the root finder estimates its own slopes, so that
-        nothing but the step itself is compiled.
+        Newton's method with the map's Jacobian; otherwise a root finder that estimates its own
+        slopes, so that nothing but the step itself is compiled.
 
     Raises
     ------
     NoGaitError
         If it stops anywhere else; says why.
     """
+    solve = _newton if exact else _secant
+    try:
+        state, residual = solve(section_map, guess)
+    except (LeanYawError, ValueError, np.linalg.LinAlgError) as error:
+        raise NoGaitError(str(error)) from error
+    if not residual <= section_map.precision:
+        raise NoGaitError(f"the root finder stopped at a residual of {residual:.1e}")
+    return state
+
+
+def least_change(matrix: Vector, wanted: Vector, precision: float) -> Vector:
+    """The smallest solution x of matrix x = wanted, which leaves directions alone that the matrix does not act on.
+
+    ``precision`` is the size, relative to the largest, from which a singular value counts as zero.
+    """
+    return np.linalg.lstsq(matrix, wanted, rcond=precision)[0]
+
+
+def side_of_folds(section_map: SectionMap, state: Vector) -> float:
+    """A sign, +1 or -1, that a fixed point keeps along a path of maps until it passes a fold: that of det(Jacobian - 1)."""
+    free = section_map.free
+    matrix = section_map.derivative(state)[1]
+    return float(np.sign(np.linalg.det(matrix[np.ix_(free, free)] - np.eye(len(free)))))
+
+
+def _newton(section_map: SectionMap, guess: Vector) -> tuple[Vector, float]:
+    """The state with the smallest residual that rounding allows, and that residual.
+
+    A step that does not make the residual smaller is shortened. Neutral directions are not solved for.
+    """
+    free = section_map.free
+    state = guess.copy()
+    change = (section_map.image(state) - state)[free]
+    for _ in range(_NEWTON_STEPS):
+        size = np.abs(change).max()
+        if size <= _ROUND_OFF:
+            break
+        matrix = section_map.derivative(state)[1]
+        slope = matrix[np.ix_(free, free)] - np.eye(len(free))
+        way = np.zeros(state.size)
+        way[free] = least_change(slope, -change, section_map.precision)
+        for share in _SHARES:
+            trial = state + share * way
+            try:
+                after = (section_map.image(trial) - trial)[free]
+            except (LeanYawError, ValueError):
+                continue
+            if np.abs(after).max() < size:
+                state, change = trial, after
+                break
+        else:
+            break
+    return state, float(np.abs(change).max())
+
+
+def _secant(section_map: SectionMap, guess: Vector) -> tuple[Vector, float]:
     free = section_map.free
 
     def full(x: Vector) -> Vector:
@@ -48,22 +108,12 @@ def solve_fixed_point(section_map: SectionMap, guess: Vector, *, exact: bool = T
         state = full(x)
         return (section_map.image(state) - state)[free]
 
-    def slope(x: Vector) -> Vector:
-        matrix = section_map.derivative(full(x))[1]
-        return matrix[np.ix_(free, free)] - np.eye(len(free))
-
-    try:
-        solution = root(change, guess[free], jac=slope if exact else None, options={"xtol": 1e-15})
-        residual = float(np.abs(change(solution.x)).max())
-    except (LeanYawError, ValueError, np.linalg.LinAlgError) as error:
-        raise NoGaitError(str(error)) from error
-    if not residual <= RESIDUAL_LIMIT:
-        raise NoGaitError(f"the root finder stopped at a residual of {residual:.1e}")
-    return full(solution.x)
+    x = root(change, guess[free], options={"xtol": 1e-15}).x
+    return full(x), float(np.abs(change(x)).max())
 
 
 def follow_fixed_point(
-    path: Callable[[float], Map], start: Vector, *, exact: bool = True
+    path: Callable[[float], Map], start: Vector, *, exact: bool = True, side: float | None = None
 ) -> tuple[Map, Vector]:
     """Follow a fixed point along a path of maps from 0 to 1, in pieces that shrink where it fails.
 
@@ -71,8 +121,11 @@ def follow_fixed_point(
     ----------
     path : function of [0, 1]
         Gives the map there.
-    start : shape (5,) or (6,)
+    start : shape (k,)
         The fixed point of ``path(0)``, or a guess of it.
+    exact : see ``solve_fixed_point``
+    side : +1 or -1, optional
+        Only fixed points on this side of folds are followed, see ``side_of_folds``.
 
     Returns
     -------
@@ -95,6 +148,8 @@ def follow_fixed_point(
             guess = state + share * (state - previous[1])
         try:
             found = solve_fixed_point(path(target), guess, exact=exact)
+            if side is not None and side_of_folds(path(target), found) != side:
+                raise NoGaitError("the root finder went past a fold")
         except NoGaitError as error:
             piece *= 0.5
             if piece < _SMALLEST_PIECE:

@@ -1,27 +1,38 @@
-"""Gaits of many active walkers at once: Newton's method on all of them by compiled batches."""
+"""Gaits of many active walkers at once, by compiled batches.
+
+A Jacobian costs as much as some fifty steps. So Newton's method takes an exact one at first, improves it by Broyden's rule from the steps
+walked anyway, and takes another only where the residual does not fall fast.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lean_yaw_env.analysis.fixed_point import RESIDUAL_LIMIT
+from lean_yaw_env.analysis.section_map import RESIDUAL_LIMIT
 from lean_yaw_env.kernel.batch import step_batch
 from lean_yaw_env.kernel.jacobian import step_jacobians
 from lean_yaw_env.kernel.records import STEPPED, Body, Outcome
 from lean_yaw_env.parameters import MIRROR, QUARTER_TURN, STATE_SIZE, Vector
+from lean_yaw_env.threads import share_out
 
-_NEWTON_STEPS = 30
+_JACOBIANS = 3
+"""Most exact ones on the way to a fixed point."""
+_FAST = 0.7
+"""A step that leaves more of the residual than this share asks for a new Jacobian."""
+_ON_THE_WAY = 1e-6
+"""Residual of gaits that only lead to others."""
 _FIRST_PIECE = 0.25
 _SMALLEST_PIECE = 1.0 / 64.0
 _SLOPE = Body._fields.index("slope")
 _SLOPE_TURNS = Body._fields.index("slope_turns")
 _HIP_WIDTH = Body._fields.index("hip_width")
 _STATUS = Outcome._fields.index("status")
+
+Index = NDArray[np.intp]
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -35,33 +46,40 @@ class WalkerGrid:
     inter_leg_angles : shape (n,)
     offsets : shape (n, 2)
         In force while the left and while the right foot stands.
+    threads : int
+        That share each batch.
     """
 
     bodies: Vector
     inter_leg_angles: Vector
     offsets: Vector
+    threads: int = 1
 
     @property
     def n(self) -> int:
         return len(self.bodies)
 
-    def at(self, index: NDArray[np.intp]) -> WalkerGrid:
+    def at(self, index: Index | Flags) -> WalkerGrid:
         """Some of the walkers."""
-        return WalkerGrid(self.bodies[index], self.inter_leg_angles[index], self.offsets[index])
+        return WalkerGrid(
+            self.bodies[index], self.inter_leg_angles[index], self.offsets[index], self.threads
+        )
 
     def towards(self, share: Vector) -> WalkerGrid:
         """With hip width and offsets at a share of their own, shape (n,)."""
         bodies = self.bodies.copy()
         bodies[:, _HIP_WIDTH] *= share
-        return WalkerGrid(bodies, self.inter_leg_angles, self.offsets * share[:, None])
+        return WalkerGrid(
+            bodies, self.inter_leg_angles, self.offsets * share[:, None], self.threads
+        )
 
     @property
-    def is_symmetric(self) -> NDArray[np.bool_]:
+    def is_symmetric(self) -> Flags:
         """Whether right steps mirror left ones, shape (n,)."""
         return self.offsets[:, 0] == -self.offsets[:, 1]
 
     @property
-    def has_downhill(self) -> NDArray[np.bool_]:
+    def has_downhill(self) -> Flags:
         """Whether headings differ, shape (n,)."""
         return (self.bodies[:, _SLOPE] != 0.0) & (self.bodies[:, _SLOPE_TURNS] == 0.0)
 
@@ -70,6 +88,65 @@ class WalkerGrid:
         return np.column_stack(
             [self.inter_leg_angles, self.offsets[:, foot], self.offsets[:, 1 - foot]]
         )
+
+    def step(self, states: Vector, foot: int) -> Vector:
+        """Outcomes (n, 18) of a step, in the order of ``kernel.records.Outcome``."""
+        n = self.n
+        rows = np.empty((n, len(Outcome._fields)))
+        commands, sides = self.commands(foot), np.full(n, 1.0 - 2.0 * foot)
+        states = np.ascontiguousarray(states)
+        share_out(
+            lambda first, last: step_batch(
+                self.bodies, commands, states, sides, rows, first, last
+            ),
+            n,
+            self.threads,
+        )
+        return rows
+
+    def differentiate(self, states: Vector, foot: int) -> tuple[Vector, Vector, Flags]:
+        """States (n, 5) after a step, its Jacobians (n, 5, 5), and whether it was completed (n,)."""
+        n = self.n
+        statuses, afters = np.empty(n), np.empty((n, STATE_SIZE))
+        rows = np.empty((n, STATE_SIZE, STATE_SIZE))
+        commands, sides = self.commands(foot), np.full(n, 1.0 - 2.0 * foot)
+        states = np.ascontiguousarray(states)
+        share_out(
+            lambda first, last: step_jacobians(
+                self.bodies, commands, states, sides, statuses, afters, rows, first, last
+            ),
+            n,
+            self.threads,
+        )
+        return afters, rows, statuses == STEPPED
+
+    def residual(self, states: Vector) -> tuple[Vector, Flags]:
+        """Change (n, 5) over a mirrored step of symmetric walkers, over a stride of others, and whether it was completed (n,).
+
+        Where headings are all alike, theirs does not count.
+        """
+        rows = self.step(states, 0)
+        image, stepped = rows[:, :STATE_SIZE].copy(), rows[:, _STATUS] == STEPPED
+        symmetric = self.is_symmetric
+        image[symmetric] *= MIRROR
+        rest = np.flatnonzero(~symmetric & stepped)
+        if rest.size:
+            rows = self.at(rest).step(image[rest], 1)
+            image[rest], stepped[rest] = rows[:, :STATE_SIZE], rows[:, _STATUS] == STEPPED
+        change = image - states
+        change[~self.has_downhill, 0] = 0.0
+        return change, stepped
+
+    def jacobian(self, states: Vector) -> tuple[Vector, Flags]:
+        """Jacobians (n, 5, 5) of the same map, and whether it was completed (n,)."""
+        image, matrix, stepped = self.differentiate(states, 0)
+        symmetric = self.is_symmetric
+        matrix[symmetric] *= MIRROR[:, None]
+        rest = np.flatnonzero(~symmetric & stepped)
+        if rest.size:
+            _, second, stepped[rest] = self.at(rest).differentiate(image[rest], 1)
+            matrix[rest] = second @ matrix[rest]
+        return matrix, stepped
 
 
 @dataclass(frozen=True)
@@ -86,135 +163,160 @@ class GridGaits:
         Both steps in the order of ``kernel.records.Outcome``.
     """
 
-    found: NDArray[np.bool_]
+    found: Flags
     states: Vector
     strides: Vector
     outcomes: Vector
 
 
-def solve_grid(grid: WalkerGrid, guesses: Vector, *, threads: int = 1) -> GridGaits:
+def solve_grid(grid: WalkerGrid, guesses: Vector) -> GridGaits:
     """Newton's method from a guess for each walker, shape (n, 5)."""
-    states, found = _newton(grid, guesses, threads)
-    return _described(grid, states, found, threads)
+    search = _Search(grid.n)
+    found = search.solve(grid, guesses, np.arange(grid.n), is_last=np.ones(grid.n, dtype=bool))
+    return _described(grid, search, found)
 
 
-def follow_grid(grid: WalkerGrid, starts: Vector, *, threads: int = 1) -> GridGaits:
+def follow_grid(grid: WalkerGrid, starts: Vector) -> GridGaits:
     """Follow each gait from no hip width and no offset, where ``starts`` (n, 5) are gaits.
 
     So the gait found is of that branch, where several exist, and none beyond a fold.
     """
     n = grid.n
-    reached, piece, known = np.zeros(n), np.full(n, _FIRST_PIECE), np.zeros(n, dtype=int)
-    latest, earlier, reached_before = starts.copy(), starts.copy(), np.zeros(n)
-    flying = np.arange(n)
+    search = _Search(n)
+    reached, piece = np.zeros(n), np.full(n, _FIRST_PIECE)
+    latest, earlier, reached_before = starts.copy(), starts.copy(), np.full(n, np.nan)
+    flying = search.begin(grid.towards(reached), starts)
     while flying.size:
-        target = np.where(known[flying] == 0, 0.0, np.minimum(1.0, reached[flying] + piece[flying]))
-        guess = latest[flying]
-        behind = known[flying] > 1
-        span = np.where(behind, reached[flying] - reached_before[flying], 1.0)
-        share = np.where(behind, (target - reached[flying]) / span, 0.0)
-        guess = guess + share[:, None] * (guess - earlier[flying])
-        state, done = _newton(grid.at(flying).towards(target), guess, threads)
+        target = np.minimum(1.0, reached[flying] + piece[flying])
+        span = reached[flying] - reached_before[flying]
+        share = np.where(np.isnan(span), 0.0, (target - reached[flying]) / span)
+        guess = latest[flying] + share[:, None] * (latest[flying] - earlier[flying])
+        done = search.solve(grid.at(flying).towards(target), guess, flying, target == 1.0)
         good, bad = flying[done], flying[~done]
-        earlier[good], latest[good] = latest[good], state[done]
+        earlier[good], latest[good] = latest[good], search.states[good]
         reached_before[good], reached[good] = reached[good], target[done]
-        known[good] += 1
         piece[good] *= 1.5
-        piece[bad] *= 0.5
-        over = (reached >= 1.0) | (piece < _SMALLEST_PIECE)
-        over[bad[known[bad] == 0]] = True
-        flying = flying[~over[flying]]
-    return _described(grid, latest, (reached >= 1.0) & (known > 0), threads)
+        piece[bad] *= 0.25
+        flying = flying[(reached[flying] < 1.0) & (piece[flying] >= _SMALLEST_PIECE)]
+    return _described(grid, search, reached >= 1.0)
 
 
-def _newton(grid: WalkerGrid, guesses: Vector, threads: int) -> tuple[Vector, NDArray[np.bool_]]:
-    x, found = guesses.copy(), np.zeros(grid.n, dtype=bool)
-    active = np.arange(grid.n)
-    for _ in range(_NEWTON_STEPS):
-        sane = (np.abs(x[active][:, [1, 2]]) < QUARTER_TURN).all(axis=1)
-        sane &= np.isfinite(x[active]).all(axis=1)
-        active = active[sane]
-        if not active.size:
-            break
-        some = grid.at(active)
-        image, matrix, stepped = _map(some, x[active], threads)
-        change = x[active] - image
+class _Search:
+    """Newton's method for ``n`` walkers, which remembers where each one is and its inverse Jacobian.
+
+    Attributes
+    ----------
+    states : shape (n, 5)
+        Fixed points where the last search ended well.
+    matrices : shape (n, 5, 5)
+        Exact Jacobians there of the walkers that have come to their end.
+    """
+
+    def __init__(self, n: int) -> None:
+        self.states = np.full((n, STATE_SIZE), np.nan)
+        self.matrices = np.full((n, STATE_SIZE, STATE_SIZE), np.nan)
+        self._inverse = np.full((n, STATE_SIZE, STATE_SIZE), np.nan)
+        self._side = np.zeros(n)
+
+    def begin(self, grid: WalkerGrid, states: Vector) -> Index:
+        """Start from fixed points (n, 5); which of the walkers can. From then on gaits on the other side of a fold are no solutions."""
+        index = np.flatnonzero(_is_sane(states))
+        residual, stepped = grid.at(index).residual(states[index])
+        index = index[stepped & (_size(residual) <= _ON_THE_WAY)]
+        index = index[self._renew(grid.at(index), states[index], index)]
+        self._side[index] = np.sign(np.linalg.det(self._inverse[index]))
+        return index
+
+    def solve(self, grid: WalkerGrid, guesses: Vector, who: Index, is_last: Flags) -> Flags:
+        """Search from guesses (m, 5) for the fixed points of a grid of the m walkers ``who``; whether each was found (m,).
+
+        ``is_last`` says where no further search follows, so that the solution is wanted to round-off.
+        """
+        limits = np.where(is_last, RESIDUAL_LIMIT, _ON_THE_WAY)
+        before = self._inverse[who]
+        x, residual = guesses.copy(), np.zeros((grid.n, STATE_SIZE))
+        found = np.zeros(grid.n, dtype=bool)
+        jacobians = np.zeros(grid.n, dtype=int)
+        lacks = np.isnan(self._inverse[who, 0, 0])
+        active = np.flatnonzero(_is_sane(x))
+        residual[active], stepped = grid.at(active).residual(x[active])
+        active = active[stepped]
+        while active.size:
+            is_done = _size(residual[active]) <= limits[active]
+            found[active[is_done]] = True
+            active = active[~is_done]
+            fresh = active[lacks[active]]
+            if fresh.size:
+                jacobians[fresh] += 1
+                lacks[fresh] = ~self._renew(grid.at(fresh), x[fresh], who[fresh])
+                lacks[fresh] |= jacobians[fresh] > _JACOBIANS
+                active = active[~lacks[active]]
+            step = -_times(self._inverse[who[active]], residual[active])
+            x[active] += step
+            sane = _is_sane(x[active])
+            active, step = active[sane], step[sane]
+            after, stepped = grid.at(active).residual(x[active])
+            active, step, after = active[stepped], step[stepped], after[stepped]
+            lacks[active] = ~(_size(after) <= _FAST * _size(residual[active]))
+            self._improve(who[active], step, after - residual[active])
+            residual[active] = after
+        last = np.flatnonzero(found & is_last)
+        found[last] = self._renew(grid.at(last), x[last], who[last])
+        last = last[found[last]]
+        # once more, without a look: from just below the limit to round-off
+        x[last] -= _times(self._inverse[who[last]], residual[last])
+        side = self._side[who[found]]
+        found[found] = (side == 0.0) | (np.sign(np.linalg.det(self._inverse[who[found]])) == side)
+        self.states[who[found]] = x[found]
+        self._inverse[who[~found]] = before[~found]
+        return found
+
+    def _renew(self, grid: WalkerGrid, states: Vector, who: Index) -> Flags:
+        """Take exact Jacobians; whether each exists and lets Newton's method go on."""
+        matrix, exists = grid.jacobian(states)
         slope = matrix - np.eye(STATE_SIZE)
-        change[~some.has_downhill, 0] = 0.0
-        slope[~some.has_downhill, 0] = np.eye(STATE_SIZE)[0]
-        done = stepped & (np.abs(change).max(axis=1) <= RESIDUAL_LIMIT)
-        found[active[done]] = True
-        going = stepped & ~done
-        going[going] = np.abs(np.linalg.det(slope[going])) > 1e-14
-        active, change, slope = active[going], change[going], slope[going]
-        if active.size:
-            x[active] += np.linalg.solve(slope, change[..., None])[..., 0]
-    return x, found
+        slope[~grid.has_downhill, 0] = np.eye(STATE_SIZE)[0]
+        exists[exists] = np.abs(np.linalg.det(slope[exists])) > 1e-14
+        self.matrices[who[exists]] = matrix[exists]
+        self._inverse[who[exists]] = np.linalg.inv(slope[exists])
+        return exists
+
+    def _improve(self, who: Index, step: Vector, change: Vector) -> None:
+        """Broyden's rule: the smallest change of the Jacobian that explains what a step has done."""
+        inverse = self._inverse[who]
+        along = (step[:, :, None] * inverse).sum(axis=1)
+        scale = (along * change).sum(axis=1)
+        scale[scale == 0.0] = np.inf
+        update = (step - _times(inverse, change)) / scale[:, None]
+        self._inverse[who] = inverse + update[:, :, None] * along[:, None, :]
 
 
-def _map(
-    grid: WalkerGrid, states: Vector, threads: int
-) -> tuple[Vector, Vector, NDArray[np.bool_]]:
-    """The section map: a mirrored step of symmetric walkers, a stride of others."""
-    image, matrix, stepped = _differentiated(grid, states, 0, threads)
-    symmetric = grid.is_symmetric
-    image[symmetric] *= MIRROR
-    matrix[symmetric] *= MIRROR[:, None]
-    rest = np.flatnonzero(~symmetric & stepped)
-    if rest.size:
-        image[rest], second, stepped[rest] = _differentiated(grid.at(rest), image[rest], 1, threads)
-        matrix[rest] = second @ matrix[rest]
-    return image, matrix, stepped
+def _times(matrices: Vector, vectors: Vector) -> Vector:
+    return (matrices * vectors[:, None, :]).sum(axis=2)
 
 
-def _differentiated(
-    grid: WalkerGrid, states: Vector, foot: int, threads: int
-) -> tuple[Vector, Vector, NDArray[np.bool_]]:
-    n = grid.n
-    statuses, afters = np.empty(n), np.empty((n, STATE_SIZE))
-    rows = np.empty((n, STATE_SIZE, STATE_SIZE))
-    commands, sides = grid.commands(foot), np.full(n, 1.0 - 2.0 * foot)
-    bodies, states = np.ascontiguousarray(grid.bodies), np.ascontiguousarray(states)
-
-    def part(first: int, last: int) -> None:
-        step_jacobians(bodies, commands, states, sides, statuses, afters, rows, first, last)
-
-    _in_parts(part, n, threads)
-    return afters, rows, statuses == STEPPED
+def _size(changes: Vector) -> Vector:
+    return np.abs(changes).max(axis=1, initial=0.0)
 
 
-def _described(
-    grid: WalkerGrid, states: Vector, found: NDArray[np.bool_], threads: int
-) -> GridGaits:
-    n = grid.n
-    strides = np.full((n, STATE_SIZE, STATE_SIZE), np.nan)
-    outcomes = np.full((n, 2, len(Outcome._fields)), np.nan)
+def _is_sane(states: Vector) -> Flags:
+    return np.isfinite(states).all(axis=1) & (np.abs(states[:, 1:3]) < QUARTER_TURN).all(axis=1)
+
+
+def _described(grid: WalkerGrid, search: _Search, found: Flags) -> GridGaits:
+    """The gaits found, with both steps and the stride's Jacobian."""
+    found, states = found.copy(), np.full((grid.n, STATE_SIZE), np.nan)
+    strides = np.full((grid.n, STATE_SIZE, STATE_SIZE), np.nan)
+    outcomes = np.full((grid.n, 2, len(Outcome._fields)), np.nan)
     index = np.flatnonzero(found)
-    if index.size:
-        some, start = grid.at(index), np.ascontiguousarray(states[index])
-        middle, first, _ = _differentiated(some, start, 0, threads)
-        _, second, stepped = _differentiated(some, middle, 1, threads)
-        strides[index] = second @ first
-        for foot, at in ((0, start), (1, middle)):
-            rows = np.empty((index.size, len(Outcome._fields)))
-            sides = np.full(index.size, 1.0 - 2.0 * foot)
-            bodies, commands = np.ascontiguousarray(some.bodies), some.commands(foot)
-            step_batch(bodies, commands, at, sides, rows, 0, index.size)
-            outcomes[index, foot] = rows
-            stepped &= rows[:, _STATUS] == STEPPED
-        found = found.copy()
-        found[index[~stepped]] = False
-    blank = ~found
-    states = states.copy()
-    states[blank], strides[blank], outcomes[blank] = np.nan, np.nan, np.nan
+    steps = np.empty((index.size, 2, len(Outcome._fields)))
+    steps[:, 0] = grid.at(index).step(search.states[index], 0)
+    steps[:, 1] = grid.at(index).step(steps[:, 0, :STATE_SIZE], 1)
+    stepped = (steps[:, :, _STATUS] == STEPPED).all(axis=1)
+    found[index[~stepped]] = False
+    index = index[stepped]
+    states[index], outcomes[index] = search.states[index], steps[stepped]
+    strides[index] = search.matrices[index]
+    symmetric = index[grid.is_symmetric[index]]
+    strides[symmetric] = strides[symmetric] @ strides[symmetric]
     return GridGaits(found, states, strides, outcomes)
-
-
-def _in_parts(work: Callable[[int, int], None], n: int, threads: int) -> None:
-    """Split ``n`` items among threads; the compiled code lets them run at once."""
-    if threads == 1 or n < 2 * threads:
-        work(0, n)
-        return
-    bounds = np.linspace(0, n, threads + 1).astype(int).tolist()
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(work, bounds[:-1], bounds[1:]))

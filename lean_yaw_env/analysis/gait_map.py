@@ -2,32 +2,35 @@
 
 from __future__ import annotations
 
-import itertools
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Mapping, Sequence
+from functools import singledispatch
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lean_yaw_env.analysis.fixed_point import follow_fixed_point, solve_fixed_point
+from lean_yaw_env.analysis.active_map import ActiveMap, planar_rate
+from lean_yaw_env.analysis.fixed_point import solve_fixed_point
 from lean_yaw_env.analysis.gait_grid import GridGaits, WalkerGrid, follow_grid, solve_grid
-from lean_yaw_env.analysis.limit_cycle import cycle_at, find_limit_cycle, planar_gait_rate
-from lean_yaw_env.analysis.passive_search import search_passive
+from lean_yaw_env.analysis.limit_cycle import cycle_at, sorted_eigenvalues
+from lean_yaw_env.analysis.passive_map import PassiveMap
+from lean_yaw_env.analysis.path import distance_walked
 from lean_yaw_env.analysis.progress import Counter
-from lean_yaw_env.analysis.section_map import ActiveMap, PassiveMap, section_map_of
+from lean_yaw_env.analysis.section_map import BODY_PARAMETERS, SectionMap, section_map_of
 from lean_yaw_env.analysis.storage import (
+    Progressing,
     labelled,
     load_dataset,
-    require_same,
+    require_axis,
     save_dataset,
 )
 from lean_yaw_env.errors import NoGaitError
-from lean_yaw_env.kernel.records import Outcome
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector, require_number
+from lean_yaw_env.kernel.records import Body, Outcome
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector
 from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.validation import require_count
 from lean_yaw_env.walker import Walker
 
 if TYPE_CHECKING:
@@ -46,18 +49,21 @@ NUMBERS = (
     "gravity_work",
     "shift_work",
 )
-"""One value at each point: the largest multiplier's magnitude, and fields of ``LimitCycle``."""
+"""One value at each point: the largest multiplier's magnitude, and properties of ``LimitCycle``."""
 
 Columns = dict[str, NDArray[Any]]
-"""A map's variables while it is made, one row for each point."""
+"""A map's variables, one row for each point."""
 
-_CHUNK = 256
+Map = TypeVar("Map", bound=SectionMap)
+
+_CHUNK = 2048
+"""Points at a time: what is needed beside the result does not grow with their number."""
 _NEAR = 0.1
 """A gait found from a neighbour's is its continuation if no coordinate differs by more."""
 
 
 def stability_map(
-    walker: Walker | PassiveWalker,
+    walker: Walker | PassiveWalker | SectionMap,
     axes: Mapping[str, Sequence[float] | Vector],
     *,
     inter_leg_angle: float = INTER_LEG_ANGLE,
@@ -74,14 +80,13 @@ def stability_map(
 
     Parameters
     ----------
-    walker : Walker or PassiveWalker
+    walker : Walker, PassiveWalker or SectionMap
         Holds the parameters that are not on an axis.
     axes : one to three names of parameters, each with its values
-        Names of ``BODY_PARAMETERS``, and for the active walker of ``COMMAND_PARAMETERS``.
+        Names of the map's ``parameters``: ``BODY_PARAMETERS``, and for the active walker ``COMMAND_PARAMETERS``.
     inter_leg_angle, mass_offset : see ``find_limit_cycle``
     path : file name, optional
-        Where to keep what is done: written after every chunk, whole or not at all. Called again
-        with the same file, an interrupted map goes on where it was.
+        Where to keep what is done, whole or not at all. Called again with the same file, an interrupted map goes on where it was.
     threads : int >= 1
     progress : bool
         Show a progress bar.
@@ -98,35 +103,31 @@ def stability_map(
     ValueError
         If an argument is outside its range, or the file holds another map.
     """
-    require_number("threads", threads, 1, 1024)
-    section_map = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
-    maps = _grid_maps(section_map, axes)
-    values = _empty(section_map, axes, len(maps))
-    fresh = _dataset(section_map, axes, values)
-    if path is not None and Path(path).exists():
-        stored = load_dataset(path)
-        require_same(stored, fresh, path)
-        values = {name: _flat(stored[name], len(axes)) for name in values}
-    search = _PassiveSearch(maps) if isinstance(section_map, PassiveMap) else _ActiveSearch(
-        [m for m in maps if isinstance(m, ActiveMap)], int(threads)
-    )  # fmt: skip
-    shape = tuple(len(list(axis)) for axis in axes.values())
-    with Counter("stability map", progress, len(maps)) as counter:
-        counter.advance(int((values["status"] != NOT_YET).sum()))
+    require_count("threads", threads, 1, 1024)
+    grid = _Grid(
+        section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset), axes
+    )
+    values = _empty(grid.section_map, grid.n)
+
+    def dataset() -> xarray.Dataset:
+        return _dataset(grid, values)
+
+    saved = Progressing(path, dataset)
+    saved.resume(values)
+    with saved, Counter("stability map", progress, grid.n) as counter:
         waiting = np.flatnonzero(values["status"] == NOT_YET)
+        counter.advance(grid.n - waiting.size)
         for first in range(0, waiting.size, _CHUNK):
             chunk = waiting[first : first + _CHUNK]
-            search.begin(chunk, values)
+            for name, rows in gaits_at(grid.section_map, grid.points(chunk), None, threads).items():
+                values[name][chunk] = rows
             counter.advance(chunk.size)
-            if path is not None:
-                save_dataset(_dataset(section_map, axes, values), path)
-    while _spread(search, values, shape):
-        if path is not None:
-            save_dataset(_dataset(section_map, axes, values), path)
-    result = _dataset(section_map, axes, values)
-    if path is not None:
-        save_dataset(result, path)
-    return result
+            saved.save_if_due()
+        fresh = values["status"] == FOUND
+        while fresh.any():
+            fresh = _spread(grid, values, fresh, threads)
+            saved.save_if_due()
+    return dataset()
 
 
 def save_map(dataset: xarray.Dataset, path: str | Path) -> Path:
@@ -139,239 +140,219 @@ def load_map(path: str | Path) -> xarray.Dataset:
     return load_dataset(path)
 
 
-def _grid_maps(
-    section_map: ActiveMap | PassiveMap, axes: Mapping[str, Sequence[float] | Vector]
-) -> list[ActiveMap | PassiveMap]:
-    """The map at every point of the grid, in row-major order; checks every value."""
-    if not 1 <= len(axes) <= 3:
-        raise ValueError(f"axes must name one to three parameters, not {list(axes)}")
-    for name, values in axes.items():
-        section_map.value(name)
-        array = np.asarray(values, dtype=float)
-        if array.ndim != 1 or array.size == 0 or np.any(np.diff(array) <= 0.0):
-            raise ValueError(f"axis {name} must hold growing numbers, not {values!r}")
-    maps: list[ActiveMap | PassiveMap] = []
-    # a constant offset is not its own mirror image
-    base = section_map.over(2) if "mass_offset" in axes else section_map
-    for point in itertools.product(*axes.values()):
-        moved = base
-        for name, value in zip(axes, point, strict=True):
-            moved = moved.moved(name, float(value))
-        maps.append(moved)
-    return maps
+class _Grid:
+    """The points of a map, in row-major order; checks every value of the axes."""
+
+    def __init__(
+        self, section_map: SectionMap, axes: Mapping[str, Sequence[float] | Vector]
+    ) -> None:
+        if not 1 <= len(axes) <= 3:
+            raise ValueError(f"axes must name one to three parameters, got {list(axes)}")
+        for name in axes:
+            section_map = section_map.along(name)
+        self.section_map = section_map
+        self.axes: dict[str, Vector] = {}
+        for name, values in axes.items():
+            section_map.value(name)
+            self.axes[name] = require_axis(f"axis {name}", values)
+            # each parameter has a range of its own, so that the ends speak for the values between
+            for end in self.axes[name][[0, -1]].tolist():
+                section_map.moved(name, end)
+        self.shape = tuple(axis.size for axis in self.axes.values())
+        self.n = int(np.prod(self.shape))
+
+    def points(self, index: NDArray[np.intp]) -> dict[str, Vector]:
+        """The parameters of some points."""
+        places = np.unravel_index(index, self.shape)
+        return {name: axis[k] for (name, axis), k in zip(self.axes.items(), places, strict=True)}
 
 
-def _empty(section_map: ActiveMap | PassiveMap, axes: Mapping[str, Any], n: int) -> Columns:
-    modes = 3 if _is_planar(section_map) else len(section_map.names)
+def _empty(section_map: SectionMap, n: int) -> Columns:
     values: Columns = {name: np.full(n, np.nan) for name in NUMBERS}
     values["status"] = np.full(n, NOT_YET, dtype=np.int8)
     values["state"] = np.full((n, len(section_map.names)), np.nan)
+    modes = len(section_map.names) if len(section_map.free) > 3 else len(section_map.free)
     values["eigenvalue_real"] = np.full((n, modes), np.nan)
     values["eigenvalue_imag"] = np.full((n, modes), np.nan)
     return values
 
 
-def _is_planar(section_map: ActiveMap | PassiveMap) -> bool:
-    return isinstance(section_map, PassiveMap) and section_map.walker.planar
-
-
-def _flat(variable: xarray.DataArray, n_axes: int) -> Vector:
-    array = variable.to_numpy()
-    return array.reshape(-1, *array.shape[n_axes:]).copy()
-
-
-def _dataset(
-    section_map: ActiveMap | PassiveMap,
-    axes: Mapping[str, Sequence[float] | Vector],
-    values: Columns,
-) -> xarray.Dataset:
-    names = list(axes)
-    coordinates = {name: np.asarray(axis, dtype=float) for name, axis in axes.items()}
-    shape = tuple(axis.size for axis in coordinates.values())
+def _dataset(grid: _Grid, values: Columns) -> xarray.Dataset:
+    names = list(grid.axes)
     last = {"state": ["coordinate"], "eigenvalue_real": ["mode"], "eigenvalue_imag": ["mode"]}
-    question: dict[str, Any] = {
-        "walker": type(section_map.walker).__name__,
-        "parameters": {
-            name: value
-            for name, value in asdict(section_map.walker.parameters).items()
-            if name not in names
-        },
-    }
-    if isinstance(section_map, ActiveMap):
-        question["inter_leg_angle"] = section_map.inter_leg_angle
-        question["mass_offset"] = list(section_map.mass_offset)
-    else:
-        question["planar"] = section_map.walker.planar
+    question = grid.section_map.question()
+    question["parameters"] = {k: v for k, v in question["parameters"].items() if k not in names}
     return labelled().Dataset(
         {
-            name: ([*names, *last.get(name, [])], array.reshape(*shape, *array.shape[1:]))
+            name: ([*names, *last.get(name, [])], array.reshape(*grid.shape, *array.shape[1:]))
             for name, array in values.items()
         },
-        coords={**coordinates, "coordinate": list(section_map.names)},
+        coords={**grid.axes, "coordinate": list(grid.section_map.names)},
         attrs={"question": json.dumps(question, sort_keys=True)},
     )
 
 
-class _ActiveSearch:
-    """Gaits of active walkers, a chunk in a few compiled calls."""
+@singledispatch
+def gaits_at(
+    section_map: SectionMap, points: Mapping[str, Vector], guesses: Vector | None, threads: int
+) -> Columns:
+    """Gaits of a map that is moved to n points.
 
-    def __init__(self, maps: list[ActiveMap], threads: int) -> None:
-        self._threads = threads
-        self._grid = WalkerGrid(
-            np.array([m.walker.parameters.body() for m in maps]),
-            np.array([m.inter_leg_angle for m in maps]),
-            np.array([m.mass_offset for m in maps]),
-        )
-        self._maps = maps
+    Parameters
+    ----------
+    section_map : SectionMap
+    points : by parameter, its values (n,)
+    guesses : shape (n, k), or None to look for the gaits anew
+        A gait is only found from a guess that is near it.
+    threads : int
 
-    def begin(self, index: NDArray[np.intp], values: Columns) -> None:
-        """Follow the gaits of some points from no hip width and no offset."""
-        rates = [
-            planar_gait_rate(self._maps[i].walker, self._maps[i].inter_leg_angle) for i in index
-        ]
-        starts = np.zeros((index.size, 5))
-        starts[:, 1] = 0.5 * self._grid.inter_leg_angles[index]
-        starts[:, 3] = rates
-        has_start = np.isfinite(starts[:, 3])
-        values["status"][index] = NONE_FOUND
-        some = index[has_start]
-        if some.size:
-            gaits = follow_grid(self._grid.at(some), starts[has_start], threads=self._threads)
-            self._write(some, gaits, values)
-        pumped = index[~has_start & (self._grid.offsets[index, 0] != self._grid.offsets[index, 1])]
-        for i in pumped[: 1 if pumped.size else 0]:
-            self._seed(int(i), values)
+    Returns
+    -------
+    The map's variables, n rows each.
+    """
+    return _one_by_one(section_map, points, guesses, lambda moved: next(moved.search()))
 
-    def spread(self, index: NDArray[np.intp], guesses: Vector, values: Columns) -> int:
-        """Try some points from guesses; how many were found."""
-        gaits = solve_grid(self._grid.at(index), guesses, threads=self._threads)
-        near = gaits.found & (np.abs(np.nan_to_num(gaits.states - guesses)).max(axis=1) < _NEAR)
-        gaits = replace(gaits, found=near)
-        self._write(index, gaits, values)
-        return int(near.sum())
 
-    def _seed(self, i: int, values: Columns) -> None:
-        """Where pumping alone drives the walker: one gait, from which neighbours are found."""
+@gaits_at.register
+def _(
+    section_map: PassiveMap, points: Mapping[str, Vector], guesses: Vector | None, threads: int
+) -> Columns:
+    return _one_by_one(section_map, points, guesses, PassiveMap.long_gait)
+
+
+@gaits_at.register
+def _(
+    section_map: ActiveMap, points: Mapping[str, Vector], guesses: Vector | None, threads: int
+) -> Columns:
+    grid = _walker_grid(section_map, points, threads)
+    if guesses is not None:
+        gaits = solve_grid(grid, guesses)
+        near = np.abs(np.nan_to_num(gaits.states - guesses)).max(axis=1) <= _NEAR
+        return _columns(section_map, grid, gaits, gaits.found & near)
+    radius, slope = (grid.bodies[:, Body._fields.index(k)] for k in ("foot_radius", "slope"))
+    starts = np.zeros((grid.n, 5))
+    starts[:, 1] = 0.5 * grid.inter_leg_angles
+    starts[:, 3] = [
+        planar_rate(*each, 0.0)
+        for each in zip(radius.tolist(), slope.tolist(), grid.inter_leg_angles.tolist(), strict=True)
+    ]
+    gaits = follow_grid(grid, starts)
+    values = _columns(section_map, grid, gaits, gaits.found)
+    # where only pumping drives the walker: one gait, from which neighbours are found
+    pumped = np.flatnonzero(np.isnan(starts[:, 3]) & (grid.offsets[:, 0] != grid.offsets[:, 1]))
+    for i in pumped[:1]:
+        here = {name: array[i : i + 1] for name, array in points.items()}
+        seed = _one_by_one(section_map, here, None, lambda moved: next(moved.search()))
+        for name in values:
+            values[name][i] = seed[name][0]
+    return values
+
+
+def _one_by_one(
+    section_map: Map,
+    points: Mapping[str, Vector],
+    guesses: Vector | None,
+    search: Callable[[Map], Vector],
+) -> Columns:
+    n = len(next(iter(points.values())))
+    values = _empty(section_map, n)
+    values["status"][:] = NONE_FOUND
+    for i in range(n):
+        moved = section_map
+        for name, array in points.items():
+            moved = moved.moved(name, float(array[i]))
         try:
-            cycle = find_limit_cycle(
-                self._maps[i].walker,
-                inter_leg_angle=self._maps[i].inter_leg_angle,
-                mass_offset=self._maps[i].mass_offset,
-            )
+            if guesses is None:
+                state = search(moved)
+            else:
+                state = solve_fixed_point(moved, guesses[i])
+                if np.abs(state - guesses[i]).max() > _NEAR:
+                    continue
+            cycle = cycle_at(moved, state)
         except NoGaitError:
-            return
-        self.spread(np.array([i]), cycle.state[None], values)
-
-    def _write(self, index: NDArray[np.intp], gaits: GridGaits, values: Columns) -> None:
-        some = index[gaits.found]
-        if not some.size:
-            return
-        values["status"][some] = FOUND
-        values["state"][some] = gaits.states[gaits.found]
-        field = {
-            name: gaits.outcomes[gaits.found][:, :, k] for k, name in enumerate(Outcome._fields)
-        }
-        duration = field["duration"].sum(axis=1)
-        chord = np.hypot(field["displacement_x"].sum(axis=1), field["displacement_z"].sum(axis=1))
-        values["speed"][some] = chord / duration
-        values["step_length"][some] = 0.5 * chord
-        values["stride_period"][some] = duration
-        values["least_normal_force"][some] = field["least_normal_force"].min(axis=1)
-        values["greatest_friction"][some] = field["greatest_friction"].max(axis=1)
-        values["gravity_work"][some] = field["gravity_work"].sum(axis=1) / chord
-        values["shift_work"][some] = field["shift_work"].sum(axis=1) / chord
-        matrices = gaits.strides[gaits.found]
-        free = self._grid.at(some).has_downhill
-        for i, matrix, all_free in zip(some, matrices, free, strict=True):
-            own = matrix if all_free else matrix[1:, 1:]
-            _write_eigenvalues(int(i), np.linalg.eigvals(own), values)
-
-
-class _PassiveSearch:
-    """Gaits of passive walkers, one by one."""
-
-    def __init__(self, maps: Sequence[ActiveMap | PassiveMap]) -> None:
-        self._maps = [m for m in maps if isinstance(m, PassiveMap)]
-        self._flat: dict[tuple[float, float], Vector | None] = {}
-
-    def begin(self, index: NDArray[np.intp], values: Columns) -> None:
-        """Start each point from the planar gait of the long period."""
-        for i in index:
-            values["status"][i] = NONE_FOUND
-            start = self._planar(self._maps[i].walker)
-            if start is not None and not self._try(int(i), start, values):
-                self._follow(int(i), start, values)
-
-    def spread(self, index: NDArray[np.intp], guesses: Vector, values: Columns) -> int:
-        """Try some points from guesses; how many were found."""
-        return sum(
-            self._try(int(i), guess, values) for i, guess in zip(index, guesses, strict=True)
-        )
-
-    def _planar(self, walker: PassiveWalker) -> Vector | None:
-        key = (walker.parameters.slope, walker.parameters.foot_radius)
-        if key not in self._flat:
-            try:
-                states = search_passive(replace(walker, planar=True))
-                self._flat[key] = max(states, key=lambda state: state[1])
-            except NoGaitError:
-                self._flat[key] = None
-        return self._flat[key]
-
-    def _follow(self, i: int, start: Vector, values: Columns) -> None:
-        """From no hip width: lean grows fast with it, and Newton's method loses its way."""
-        width = self._maps[i].value("hip_width")
-        if width == 0.0:
-            return
-
-        def path(share: float) -> PassiveMap:
-            return self._maps[i].moved("hip_width", share * width)
-
-        try:
-            _, state = follow_fixed_point(path, start)
-        except NoGaitError:
-            return
-        self._try(i, state, values)
-
-    def _try(self, i: int, guess: Vector, values: Columns) -> bool:
-        try:
-            state = solve_fixed_point(self._maps[i], guess)
-        except NoGaitError:
-            return False
-        if np.abs(state - guess).max() > _NEAR:
-            return False
-        cycle = cycle_at(self._maps[i], state)
+            continue
         values["status"][i] = FOUND
         values["state"][i] = cycle.state
-        for name in NUMBERS[1:]:
+        for name in NUMBERS:
             values[name][i] = getattr(cycle, name)
-        _write_eigenvalues(i, cycle.eigenvalues, values)
-        return True
+        count = cycle.eigenvalues.size
+        values["eigenvalue_real"][i, :count] = np.real(cycle.eigenvalues)
+        values["eigenvalue_imag"][i, :count] = np.imag(cycle.eigenvalues)
+    return values
 
 
-def _write_eigenvalues(i: int, eigenvalues: NDArray[Any], values: Columns) -> None:
-    order = np.lexsort((-np.imag(eigenvalues), -np.abs(eigenvalues)))
-    n = eigenvalues.size
-    values["eigenvalue_real"][i, :n] = np.real(eigenvalues)[order]
-    values["eigenvalue_imag"][i, :n] = np.imag(eigenvalues)[order]
-    values["spectral_radius"][i] = np.abs(eigenvalues).max()
+def _walker_grid(
+    section_map: ActiveMap, points: Mapping[str, Vector], threads: int
+) -> WalkerGrid:
+    """The walkers at some points, as arrays."""
+    n = len(next(iter(points.values())))
+    bodies = np.tile(np.array(section_map.walker.parameters.body()), (n, 1))
+    commands = {
+        name: points.get(name, np.full(n, section_map.value(name)))
+        for name in ("inter_leg_angle", "mass_offset", "alternating_offset")
+    }
+    for name in set(points) & set(BODY_PARAMETERS):
+        bodies[:, Body._fields.index(name)] = points[name]
+    mean, apart = commands["mass_offset"], commands["alternating_offset"]
+    offsets = np.column_stack([mean + apart, mean - apart])
+    return WalkerGrid(bodies, commands["inter_leg_angle"], offsets, threads)
+
+
+def _columns(
+    section_map: ActiveMap, grid: WalkerGrid, gaits: GridGaits, found: NDArray[np.bool_]
+) -> Columns:
+    """The map's variables at the walkers of a grid."""
+    values = _empty(section_map, grid.n)
+    values["status"][:] = np.where(found, FOUND, NONE_FOUND)
+    values["state"][found] = gaits.states[found]
+    outcomes = gaits.outcomes[found]
+    field = {name: outcomes[:, :, k] for k, name in enumerate(Outcome._fields)}
+    steps = np.stack([field["displacement_x"], field["displacement_z"]], axis=-1)
+    has_downhill = grid.has_downhill[found]
+    turn = np.where(has_downhill, 0.0, field["heading"][:, 1] - gaits.states[found, 0])
+    distance, duration = distance_walked(steps, turn), field["duration"].sum(axis=1)
+    values["speed"][found] = distance / duration
+    values["step_length"][found] = 0.5 * distance
+    values["stride_period"][found] = duration
+    values["least_normal_force"][found] = field["least_normal_force"].min(axis=1)
+    values["greatest_friction"][found] = field["greatest_friction"].max(axis=1)
+    values["gravity_work"][found] = field["gravity_work"].sum(axis=1) / distance
+    values["shift_work"][found] = field["shift_work"].sum(axis=1) / distance
+    index = np.flatnonzero(found)
+    for all_free, first in ((True, 0), (False, 1)):
+        some = index[has_downhill == all_free]
+        eigenvalues = sorted_eigenvalues(gaits.strides[some, first:, first:])
+        count = eigenvalues.shape[1]
+        values["eigenvalue_real"][some, :count] = np.real(eigenvalues)
+        values["eigenvalue_imag"][some, :count] = np.imag(eigenvalues)
+        values["spectral_radius"][some] = np.abs(eigenvalues[:, 0])
+    return values
 
 
 def _spread(
-    search: _ActiveSearch | _PassiveSearch, values: Columns, shape: tuple[int, ...]
-) -> bool:
-    """Try points without a gait from neighbours that have just got one; whether any was found."""
-    status = values["status"].reshape(shape)
-    number = np.arange(status.size).reshape(shape)
+    grid: _Grid, values: Columns, fresh: NDArray[np.bool_], threads: int
+) -> NDArray[np.bool_]:
+    """Try points without a gait from neighbours that have just got one; which points (n,) were found."""
+    number = np.arange(grid.n).reshape(grid.shape)
     index, guess_from = [], []
-    for axis in range(len(shape)):
+    for axis in range(len(grid.shape)):
         for ahead in (1, -1):
-            here = np.take(number, range(shape[axis] - 1), axis=axis).ravel()
-            there = np.take(number, range(1, shape[axis]), axis=axis).ravel()
+            here = np.take(number, range(grid.shape[axis] - 1), axis=axis).ravel()
+            there = np.take(number, range(1, grid.shape[axis]), axis=axis).ravel()
             here, there = (here, there) if ahead > 0 else (there, here)
-            tries = (values["status"][here] == NONE_FOUND) & (values["status"][there] == FOUND)
+            tries = (values["status"][here] == NONE_FOUND) & fresh[there]
             index.append(here[tries])
             guess_from.append(there[tries])
     points, first = np.unique(np.concatenate(index), return_index=True)
     sources = np.concatenate(guess_from)[first]
-    return bool(points.size) and search.spread(points, values["state"][sources], values) > 0
+    found = np.zeros(grid.n, dtype=bool)
+    for start in range(0, points.size, _CHUNK):
+        part = slice(start, start + _CHUNK)
+        rows = gaits_at(
+            grid.section_map, grid.points(points[part]), values["state"][sources[part]], threads
+        )
+        good = rows["status"] == FOUND
+        found[points[part][good]] = True
+        for name, column in rows.items():
+            values[name][points[part][good]] = column[good]
+    return found

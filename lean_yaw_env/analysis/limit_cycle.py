@@ -1,27 +1,23 @@
-"""Limit cycles of the walkers: fixed points of section maps, with their multipliers.
+"""Limit cycles: fixed points of section maps, with their multipliers.
 
 Iterating strides finds no gait in practice: Table 1's converges by 0.986 a stride.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lean_yaw_env.analysis.fixed_point import (
-    RESIDUAL_LIMIT,
-    follow_fixed_point,
-    solve_fixed_point,
-)
-from lean_yaw_env.analysis.passive_search import search_passive
-from lean_yaw_env.analysis.section_map import ActiveMap, PassiveMap, section_map_of
-from lean_yaw_env.errors import NoGaitError
+from lean_yaw_env.analysis.active_map import ActiveMap, planar_gait_rate, search_active
+from lean_yaw_env.analysis.fixed_point import RESIDUAL_LIMIT
+from lean_yaw_env.analysis.path import axle_middle, distance_walked, turning_radius
+from lean_yaw_env.analysis.section_map import CycleStep, SectionMap, section_map_of
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector
-from lean_yaw_env.passive import PassiveStep, PassiveWalker
-from lean_yaw_env.walker import StepResult, Walker
+from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.walker import Walker
 
 __all__ = [
     "RESIDUAL_LIMIT",
@@ -31,98 +27,156 @@ __all__ = [
     "find_limit_cycle",
     "find_passive_gaits",
     "planar_gait_rate",
+    "sorted_eigenvalues",
+    "spectral_radii",
 ]
 
-_HELPING_SLOPES = (0.01, 0.02)
-"""Where to start from a gait that a slope drives, on the way to one that pumping drives."""
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LimitCycle:
     """A periodic gait.
 
+    Means are over the cycle: ``n_steps``, or two steps of a gait whose right step mirrors the left one.
+
     Attributes
     ----------
-    state : shape (5,), or (6,) of a passive walker
-        Section state on the left foot.
-    eigenvalues : shape (n,), complex
-        Of the cycle's Jacobian (the Floquet multipliers), by falling magnitude; all below one is
-        stable. Where every heading is like any other (on the level, on a slope that turns with
-        the walker) the heading's multiplier of one is left out; a planar walker has three.
-    stride_period : float
-        Duration of two steps.
-    speed : float
-        Distance from a footprint to the same foot's next one, by the time between.
-    step_length : float
-        Half of that distance.
+    state : shape (k,)
+        State on the left foot: the section state, with what else the map's state holds.
     turn : float
         Heading gained per cycle, rad: zero but where every heading is like any other.
     residual : float
         Largest change of any coordinate over the cycle (not counting ``turn``).
-    n_steps : int
-        Steps until the state recurs: 1 if a right step mirrors a left one, 2, or 4 and more past
-        a period doubling. Means are over the cycle.
     jacobian : shape (n, n)
-        Of the cycle (of two steps if ``n_steps`` is 1) in ``coordinates``.
-    coordinates : names of the section's coordinates that the gait repeats
-    gravity_work, shift_work : float
-        Per distance, in weights: what gravity gives, and what moving the masses puts in.
-    least_normal_force, greatest_friction : float
-        Least normal force (in weights) and greatest tangential over normal force.
+        Of the cycle in ``coordinates``.
+    jacobian_error : shape (n, n)
+        A bound of its error; zero where derivatives are exact.
+    coordinates : names of the state's coordinates that the gait repeats
+        Where every heading is like any other (on the level, on a slope that turns with the walker),
+        the heading is not among them; a planar walker has three.
+    steps : tuple of CycleStep
+        Of the cycle.
+    section_map : SectionMap
+        The map of which the gait is the fixed point.
     """
 
     state: Vector
-    eigenvalues: NDArray[np.complex128]
-    stride_period: float
-    speed: float
-    step_length: float
     turn: float
     residual: float
-    n_steps: int
     jacobian: Vector
+    jacobian_error: Vector = field(repr=False)
     coordinates: tuple[str, ...]
-    gravity_work: float
-    shift_work: float
-    least_normal_force: float
-    greatest_friction: float
+    steps: tuple[CycleStep, ...] = field(repr=False)
+    section_map: SectionMap = field(repr=False)
+
+    @property
+    def n_steps(self) -> int:
+        """Steps until the state recurs: 1 if a right step mirrors a left one, 2, or 4 and more past a period doubling."""
+        return self.section_map.n_steps
+
+    @cached_property
+    def eigenvalues(self) -> NDArray[np.complex128]:
+        """Of the cycle's Jacobian (the Floquet multipliers), shape (n,), by falling magnitude."""
+        return sorted_eigenvalues(self.jacobian)
+
+    @property
+    def spectral_radius(self) -> float:
+        """The largest magnitude of the eigenvalues, neutral ones apart."""
+        return float(spectral_radii(self.eigenvalues, self.section_map.neutral_within))
 
     @property
     def is_stable(self) -> bool:
-        """Whether small disturbances die out."""
-        return bool(np.abs(self.eigenvalues).max() < 1.0)
+        """Whether small disturbances die out, but for what is neutral."""
+        return self.spectral_radius < 1.0
+
+    @property
+    def cycles_to_halve(self) -> float:
+        """Cycles in which the slowest disturbance halves; infinite if it does not."""
+        radius = self.spectral_radius
+        return float(np.log(0.5) / np.log(radius)) if 0.0 < radius < 1.0 else float("inf")
+
+    @property
+    def duration(self) -> float:
+        """Of the cycle."""
+        return sum(step.duration for step in self.steps)
+
+    @cached_property
+    def distance(self) -> float:
+        """Walked in the cycle: from a footprint to the same foot's next one, the mean of both feet."""
+        return float(distance_walked([step.displacement for step in self.steps], self.turn))
+
+    @property
+    def stride_period(self) -> float:
+        """Duration of two steps."""
+        return 2.0 * self.duration / len(self.steps)
+
+    @property
+    def speed(self) -> float:
+        """Distance over time."""
+        return self.distance / self.duration
+
+    @property
+    def step_length(self) -> float:
+        """Distance of a step."""
+        return self.distance / len(self.steps)
+
+    @property
+    def gravity_work(self) -> float:
+        """What gravity gives per distance, in weights."""
+        return sum(step.gravity_work for step in self.steps) / self.distance
+
+    @property
+    def shift_work(self) -> float:
+        """What moving the masses puts in per distance, in weights."""
+        return sum(step.shift_work for step in self.steps) / self.distance
+
+    @property
+    def cost_of_transport(self) -> float:
+        """Work of gravity and of moving the masses, per weight and distance."""
+        return self.gravity_work + self.shift_work
+
+    @property
+    def least_normal_force(self) -> float:
+        """Least normal force, in weights."""
+        return min(step.least_normal_force for step in self.steps)
+
+    @property
+    def greatest_friction(self) -> float:
+        """Greatest ratio of tangential to normal force."""
+        return max(step.greatest_friction for step in self.steps)
+
+    @cached_property
+    def turning_radius(self) -> float:
+        """Of the circle on which the middle of the hip axle walks, see ``path.turning_radius``; infinite without a turn."""
+        walker = self.section_map.stander
+        prints = np.cumsum([np.zeros(2), *(step.displacement for step in self.steps)], axis=0)
+        middles = [axle_middle(walker, step.start, step.foot) for step in self.steps]
+        return turning_radius(prints[:-1] + np.array(middles), prints[-1], self.turn)
 
 
-def planar_gait_rate(walker: Walker, inter_leg_angle: float, heading: float = 0.0) -> float:
-    """Stance pitch rate just after heel strike of the planar active walker, in closed form.
+def sorted_eigenvalues(matrices: Vector) -> NDArray[np.complex128]:
+    """Eigenvalues (..., n) of matrices (..., n, n), by falling magnitude; of a pair the one above the real axis first."""
+    values = np.asarray(np.linalg.eigvals(matrices), dtype=complex)
+    order = np.lexsort((-np.imag(values), -np.abs(values)), axis=-1)
+    return np.take_along_axis(values, order, axis=-1)
 
-    Without hip width, one step multiplies the squared rate by k^2, k the planar impact's ratio,
-    after gravity has added the slope's work. Returns nan where the slope gives no energy, or no
-    impact takes any.
-    """
-    r, slope = walker.parameters.foot_radius, walker.parameters.slope
-    half = 0.5 * inter_leg_angle
-    level = r + (1.0 - r) * math.cos(half)
-    lift = (1.0 - r) * math.sin(half)
-    inertia = level**2 + lift**2
-    kept = (level**2 - lift**2) / inertia
-    step_length = 2.0 * (r * half + lift)
-    gained = 2.0 * step_length * math.sin(slope) * math.cos(heading) / inertia
-    if gained <= 0.0 or kept**2 >= 1.0:
-        return math.nan
-    return -math.sqrt(gained * kept**2 / (1.0 - kept**2))
+
+def spectral_radii(eigenvalues: NDArray[np.complex128], neutral_within: float) -> Vector:
+    """The largest magnitudes (...) among eigenvalues (..., n), those nearer to one than ``neutral_within`` apart."""
+    answers = np.abs(eigenvalues - 1.0) >= neutral_within
+    return np.abs(eigenvalues).max(axis=-1, initial=0.0, where=answers)
 
 
 def find_limit_cycle(
-    walker: Walker | PassiveWalker,
+    walker: Walker | PassiveWalker | SectionMap,
     *,
     inter_leg_angle: float = INTER_LEG_ANGLE,
     mass_offset: float | tuple[float, float] = 0.0,
 ) -> LimitCycle:
-    """Find a walker's gait at a constant command, with its multipliers.
+    """Find a walker's gait at a constant command, or any map's, with its multipliers.
 
     Parameters
     ----------
-    walker : Walker or PassiveWalker
+    walker : Walker, PassiveWalker or SectionMap
         Of a passive walker's gaits, the one with the longest period, which alone can be stable.
     inter_leg_angle : (0, pi/2)
         Of the active walker only.
@@ -139,12 +193,8 @@ def find_limit_cycle(
     ValueError
         If an argument is outside its range.
     """
-    if isinstance(walker, PassiveWalker):
-        section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
-        return find_passive_gaits(walker)[0]
     section_map = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
-    assert isinstance(section_map, ActiveMap)
-    return cycle_at(section_map, _search(section_map, exact=True))
+    return cycle_at(section_map, next(section_map.search()))
 
 
 def find_gait(
@@ -164,8 +214,8 @@ def find_gait(
     """
     section_map = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
     if not isinstance(section_map, ActiveMap):
-        raise ValueError(f"walker must be a Walker, not {walker!r}")
-    return _search(section_map, exact=False)
+        raise ValueError(f"walker must be a Walker, got {walker!r}")
+    return search_active(section_map, exact=False)
 
 
 def find_passive_gaits(walker: PassiveWalker) -> tuple[LimitCycle, ...]:
@@ -180,136 +230,34 @@ def find_passive_gaits(walker: PassiveWalker) -> tuple[LimitCycle, ...]:
         If there is none; says what was tried.
     """
     if not isinstance(walker, PassiveWalker):
-        raise ValueError(f"walker must be a PassiveWalker, not {walker!r}")
-    cycles = [cycle_at(PassiveMap(walker), state) for state in search_passive(walker)]
+        raise ValueError(f"walker must be a PassiveWalker, got {walker!r}")
+    section_map = section_map_of(walker)
+    cycles = [cycle_at(section_map, state) for state in section_map.search()]
     return tuple(sorted(cycles, key=lambda cycle: -cycle.stride_period))
 
 
-def cycle_at(section_map: ActiveMap | PassiveMap, state: Vector) -> LimitCycle:
+def cycle_at(section_map: SectionMap, state: Vector) -> LimitCycle:
     """Describe the gait at a fixed point of a section map.
 
     Parameters
     ----------
-    section_map : ActiveMap or PassiveMap
-    state : shape (5,) or (6,)
+    section_map : SectionMap
+    state : shape (k,)
         Its fixed point, as from ``solve_fixed_point``.
     """
     n_steps = section_map.n_steps
     cycle = section_map.over(2 * n_steps) if n_steps % 2 else section_map
-    results = cycle.results(state)
     free = cycle.free
-    _, matrix = cycle.derivative(state)
-    jacobian = matrix[np.ix_(free, free)]
-    eigenvalues = np.asarray(np.linalg.eigvals(jacobian), dtype=complex)
-    duration = sum(result.duration for result in results)
-    # Chords between the same foot's prints: along a turn they are what is walked
-    chord = sum(
-        float(np.linalg.norm(first.displacement + second.displacement))
-        for first, second in zip(results[::2], results[1::2], strict=True)
-    )
-    change = results[-1].state - state
-    gravity, shift = np.sum([_works(result) for result in results], axis=0).tolist()
+    linear = cycle.linearise(state)
+    steps = cycle.results(state)
+    change = steps[-1].state - state
     return LimitCycle(
         state=state,
-        eigenvalues=eigenvalues[np.lexsort((-np.imag(eigenvalues), -np.abs(eigenvalues)))],
-        stride_period=2.0 * duration / len(results),
-        speed=chord / duration,
-        step_length=chord / len(results),
-        turn=0.0 if 0 in free or cycle.n_steps % 2 else float(change[0]),
+        turn=0.0 if 0 in free else float(change[0]),
         residual=float(np.abs(change[free]).max()),
-        n_steps=n_steps,
-        jacobian=jacobian,
+        jacobian=linear.matrix[np.ix_(free, free)],
+        jacobian_error=linear.error[np.ix_(free, free)],
         coordinates=tuple(cycle.names[i] for i in free),
-        gravity_work=gravity / chord,
-        shift_work=shift / chord,
-        least_normal_force=min(result.least_normal_force for result in results),
-        greatest_friction=max(result.greatest_friction for result in results),
+        steps=tuple(steps),
+        section_map=section_map,
     )
-
-
-def _works(result: StepResult | PassiveStep) -> tuple[float, float]:
-    """Gravity's and the shift's work of a step."""
-    if isinstance(result, StepResult):
-        return result.energy.gravity_work, result.energy.shift_work
-    return result.gravity_work, 0.0
-
-
-def _search(section_map: ActiveMap, exact: bool) -> Vector:
-    """Solve from the planar gait's closed form; failing that, follow a gait from a simpler one."""
-    tried: list[str] = []
-    guess = _planar_guess(section_map)
-    if guess is None:
-        tried.append(
-            "the planar gait has no closed form here: the slope gives no energy along any heading "
-            "that balances the offset"
-        )
-    else:
-        try:
-            return solve_fixed_point(section_map, guess, exact=exact)
-        except NoGaitError as error:
-            tried.append(f"from the planar gait: {error}")
-        try:
-            return _widened(section_map, exact)
-        except NoGaitError as error:
-            tried.append(f"following the gait from no hip width and no offset: {error}")
-    if section_map.value("alternating_offset") != 0.0:
-        for slope in _HELPING_SLOPES:
-            try:
-                return _pumped(section_map, slope, exact)
-            except NoGaitError as error:
-                tried.append(f"following the gait from slope {slope:g} without pumping: {error}")
-    raise NoGaitError(
-        f"no gait found for {section_map.walker.parameters} with inter-leg angle "
-        f"{section_map.inter_leg_angle:g} and mass offset {_shown(section_map.mass_offset)}; "
-        "tried: " + "; ".join(tried)
-    )
-
-
-def _shown(offsets: tuple[float, float]) -> str:
-    left, right = offsets
-    return f"{left:g}" if left == right else f"({left:g}, {right:g})"
-
-
-def _planar_guess(section_map: ActiveMap) -> Vector | None:
-    heading, offset = 0.0, section_map.value("mass_offset")
-    parameters = section_map.walker.parameters
-    if offset != 0.0 and not parameters.slope_turns:
-        sine = -offset / math.tan(parameters.slope or math.inf)
-        if not abs(sine) < 1.0:
-            return None
-        heading = math.asin(sine)
-    rate = planar_gait_rate(section_map.walker, section_map.inter_leg_angle, heading)
-    if math.isnan(rate):
-        return None
-    return np.array([heading, 0.5 * section_map.inter_leg_angle, 0.0, rate, 0.0])
-
-
-def _widened(section_map: ActiveMap, exact: bool) -> Vector:
-    """Raise hip width and offsets together from zero."""
-    width = section_map.value("hip_width")
-    left, right = section_map.mass_offset
-
-    def path(share: float) -> ActiveMap:
-        moved = section_map.moved("hip_width", share * width)
-        return ActiveMap(
-            moved.walker, moved.inter_leg_angle, (share * left, share * right), moved.n_steps
-        )
-
-    start = _planar_guess(path(0.0))
-    if start is None:
-        raise NoGaitError("the slope gives no energy")
-    return follow_fixed_point(path, start, exact=exact)[1]
-
-
-def _pumped(section_map: ActiveMap, slope: float, exact: bool) -> Vector:
-    """From a slope that drives the gait alone: raise the offsets from zero as the slope levels."""
-    left, right = section_map.mass_offset
-    target = section_map.value("slope")
-
-    def path(share: float) -> ActiveMap:
-        moved = section_map.moved("slope", slope + share * (target - slope))
-        return ActiveMap(
-            moved.walker, moved.inter_leg_angle, (share * left, share * right), moved.n_steps
-        )
-
-    return follow_fixed_point(path, _search(path(0.0), exact), exact=exact)[1]

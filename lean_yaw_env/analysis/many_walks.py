@@ -1,4 +1,4 @@
-"""Many walks of one walker at once, step by step in compiled batches, until each falls."""
+"""Many walks of one map at once, step by step in compiled batches, until each falls."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lean_yaw_env.analysis.section_map import ActiveMap, PassiveMap
+from lean_yaw_env.analysis.section_map import SectionMap
+from lean_yaw_env.errors import SolverError
 from lean_yaw_env.kernel import records
-from lean_yaw_env.kernel.batch import step_batch
-from lean_yaw_env.kernel.passive import PassiveOutcome
-from lean_yaw_env.kernel.records import Outcome
 from lean_yaw_env.parameters import Vector
-from lean_yaw_env.passive import step_passive_rows
+from lean_yaw_env.validation import require_count
 
+SURVIVED = 0.0
+"""Ending of a walk that went to its end."""
 ENDINGS = {
-    0.0: "walked to the end",
+    SURVIVED: "walked to the end",
     records.BACKWARD: "backward",
     records.SIDEWAYS: "sideways",
     records.TRIP: "trip",
@@ -27,10 +27,8 @@ ENDINGS = {
 }
 """What ``ManyWalks.endings`` holds. A passive state that no foot behind can stand in is a trip."""
 
-_STATUS = Outcome._fields.index("status")
-_OFFSET = Outcome._fields.index("mass_offset")
-_PASSIVE_STATUS = PassiveOutcome._fields.index("status")
-_PASSIVE_ANGLE = PassiveOutcome._fields.index("inter_leg_angle")
+_CHUNK = 4096
+"""Walks at a time, so that memory does not grow with their number but for what is returned."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,7 @@ class ManyWalks:
         Steps completed.
     endings : shape (n,)
         Keys of ``ENDINGS``.
-    states : shape (n, 5) or (n, 6)
+    states : shape (n, k)
         Where each walk was last, as it stood on whichever foot.
     """
 
@@ -54,65 +52,59 @@ class ManyWalks:
     @property
     def survived(self) -> NDArray[np.bool_]:
         """Whether each walk went to its end."""
-        return self.endings == 0.0
+        return self.endings == SURVIVED
+
+    def require_solved(self) -> ManyWalks:
+        """Return these walks, or raise ``SolverError`` if the integrator has given up on one: it has not fallen."""
+        failed = self.endings == records.FAILED
+        if failed.any():
+            bad = self.states[np.argmax(failed)].tolist()
+            raise SolverError(f"the step from {bad} did not converge")
+        return self
 
 
-def walk_many(section_map: ActiveMap | PassiveMap, states: Vector, n_steps: int) -> ManyWalks:
-    """Walk ``n_steps`` from each state, left foot first, with the map's command.
+def walk_many(section_map: SectionMap, states: Vector, n_steps: int) -> ManyWalks:
+    """Walk ``n_steps`` from each state, left foot first.
 
     Parameters
     ----------
-    section_map : ActiveMap or PassiveMap
+    section_map : SectionMap
         How many steps it takes itself plays no part.
-    states : shape (n, 5) or (n, 6)
-    n_steps : int
+    states : shape (n, k)
+    n_steps : int >= 1
+
+    Raises
+    ------
+    ValueError
+        If ``n_steps`` is outside its range.
     """
-    n = len(states)
+    require_count("n_steps", n_steps, 1, 1_000_000)
     current = np.array(states, dtype=float)
-    steps, endings = np.zeros(n, dtype=np.int64), np.zeros(n)
-    stepper = (
-        _ActiveStepper(section_map, n)
-        if isinstance(section_map, ActiveMap)
-        else _PassiveStepper(section_map, n)
-    )
-    walking = np.arange(n)
-    for k in range(n_steps):
-        if not walking.size:
-            break
-        after, status = stepper.step(walking, current[walking], k % 2)
-        current[walking] = after
-        done = status == records.STEPPED
-        steps[walking[done]] += 1
-        endings[walking[~done]] = status[~done]
-        walking = walking[done]
+    steps, endings = np.zeros(len(current), dtype=np.int64), np.zeros(len(current))
+    for first in range(0, len(current), _CHUNK):
+        part = slice(first, first + _CHUNK)
+        _walk(section_map, current[part], steps[part], endings[part], n_steps)
     return ManyWalks(steps, endings, current)
 
 
-class _ActiveStepper:
-    def __init__(self, section_map: ActiveMap, n: int) -> None:
-        self._bodies = np.array([section_map.walker.parameters.body()])
-        self._angle, self._offsets = section_map.inter_leg_angle, section_map.mass_offset
-        self._in_force = np.full(n, self._offsets[1])
-
-    def step(self, who: NDArray[np.intp], states: Vector, foot: int) -> tuple[Vector, Vector]:
-        n = who.size
-        commands = np.column_stack(
-            [np.full(n, self._angle), np.full(n, self._offsets[foot]), self._in_force[who]]
-        )
-        rows = np.empty((n, len(Outcome._fields)))
-        sides = np.full(n, 1.0 - 2.0 * foot)
-        step_batch(self._bodies, commands, np.ascontiguousarray(states), sides, rows, 0, n)
-        self._in_force[who] = rows[:, _OFFSET]
-        return rows[:, :5], rows[:, _STATUS]
-
-
-class _PassiveStepper:
-    def __init__(self, section_map: PassiveMap, n: int) -> None:
-        self._walker = section_map.walker
-        self._angles = np.full(n, np.nan)
-
-    def step(self, who: NDArray[np.intp], states: Vector, foot: int) -> tuple[Vector, Vector]:
-        sides = np.full(who.size, 1.0 - 2.0 * foot)
-        rows = step_passive_rows(self._walker, states, sides, self._angles[who])
-        self._angles[who] = rows[:, _PASSIVE_ANGLE]
-        return rows[:, :6], rows[:, _PASSIVE_STATUS]
+def _walk(
+    section_map: SectionMap,
+    states: Vector,
+    steps: NDArray[np.int64],
+    endings: Vector,
+    n_steps: int,
+) -> None:
+    """Walk from states, which are overwritten by the last ones."""
+    walking = np.arange(len(states))
+    carried = np.full(len(states), section_map.carried)
+    for k in range(n_steps):
+        if not walking.size:
+            break
+        after, handed_on, status = section_map.step_many(states[walking], carried, k % 2)
+        done = status == records.STEPPED
+        # the integrator's failure leaves nothing that means anything
+        known = status != records.FAILED
+        states[walking[known]] = after[known]
+        steps[walking[done]] += 1
+        endings[walking[~done]] = status[~done]
+        walking, carried = walking[done], handed_on[done]

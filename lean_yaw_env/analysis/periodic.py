@@ -6,22 +6,24 @@ import numpy as np
 
 from lean_yaw_env.analysis.fixed_point import solve_fixed_point
 from lean_yaw_env.analysis.limit_cycle import LimitCycle, cycle_at, find_limit_cycle
-from lean_yaw_env.analysis.section_map import ActiveMap, PassiveMap, section_map_of
+from lean_yaw_env.analysis.section_map import SectionMap, section_map_of
 from lean_yaw_env.errors import LeanYawError, NoGaitError
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector, require_number
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector
 from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.validation import require_count
 from lean_yaw_env.walker import Walker
 
 _KICKS = (1e-3, -1e-3, 1e-2, -1e-2)
 """How far along the unstable mode to start, as a share of the state's length."""
 _SETTLING = 600
 """Cycles to let the walk settle; slowest just past the doubling."""
+_RECURS = 1e-9
 _DIFFERENT = 1e-7
 """A cycle whose halves are closer than this has the half period."""
 
 
 def find_periodic_gait(
-    walker: Walker | PassiveWalker,
+    walker: Walker | PassiveWalker | SectionMap,
     *,
     n_steps: int,
     inter_leg_angle: float = INTER_LEG_ANGLE,
@@ -34,7 +36,7 @@ def find_periodic_gait(
 
     Parameters
     ----------
-    walker : Walker or PassiveWalker
+    walker : Walker, PassiveWalker or SectionMap
     n_steps : even int in [2, 64]
         Steps of one leg: 2 is a gait that limps, 4 its doubling.
     inter_leg_angle, mass_offset : see ``find_limit_cycle``
@@ -46,12 +48,11 @@ def find_periodic_gait(
     ValueError
         If an argument is outside its range.
     """
-    require_number("n_steps", n_steps, 2, 64)
-    if n_steps % 2 or n_steps != int(n_steps):
-        raise ValueError(f"n_steps must be even, not {n_steps!r}")
-    simple = find_limit_cycle(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
+    if require_count("n_steps", n_steps, 2, 64) % 2:
+        raise ValueError(f"n_steps must be even, got {n_steps!r}")
     single = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
-    cycle = single.over(int(n_steps))
+    simple = find_limit_cycle(single)
+    cycle = single.over(n_steps)
     reasons: list[str] = []
     for kick in _KICKS:
         try:
@@ -65,7 +66,7 @@ def find_periodic_gait(
     raise NoGaitError(f"no gait of {n_steps} steps found; " + "; ".join(reasons))
 
 
-def _kicked(single: ActiveMap | PassiveMap, state: Vector, kick: float) -> Vector:
+def _kicked(single: SectionMap, state: Vector, kick: float) -> Vector:
     """The fixed point moved along its most unstable mode."""
     free = single.free
     matrix = single.derivative(state)[1][np.ix_(free, free)]
@@ -76,24 +77,22 @@ def _kicked(single: ActiveMap | PassiveMap, state: Vector, kick: float) -> Vecto
     return moved
 
 
-def _settle(single: ActiveMap | PassiveMap, state: Vector, n_steps: int) -> Vector:
+def _settle(single: SectionMap, state: Vector, n_steps: int) -> Vector:
     """Walk until the state recurs after ``n_steps``, or for as long as is bearable."""
     cycle = single.over(n_steps)
     for _ in range(_SETTLING):
         after = cycle.image(state)
-        if float(np.abs(after - state)[cycle.free].max()) < 1e-9:
+        if float(np.abs(after - state)[cycle.free].max()) < max(_RECURS, cycle.precision):
             return after
         state = after
     return state
 
 
-def _require_full_period(
-    single: ActiveMap | PassiveMap, cycle: ActiveMap | PassiveMap, state: Vector
-) -> None:
+def _require_full_period(single: SectionMap, cycle: SectionMap, state: Vector) -> None:
     """Raise ``NoGaitError`` if the state recurs earlier."""
     half = cycle.n_steps // 2
     if half < single.n_steps:
         return
     apart = (single.over(half).image(state) - state)[cycle.free]
-    if float(np.abs(apart).max()) < _DIFFERENT:
+    if float(np.abs(apart).max()) < max(_DIFFERENT, 10.0 * cycle.precision):
         raise NoGaitError(f"the walk settled to a gait of {half} steps or fewer")

@@ -1,4 +1,4 @@
-"""The stride map (two steps, left foot to left foot) and its exact Jacobian; eqs. (6) and (7) of the paper."""
+"""The derivatives of a walking step, and the stride map (two steps, left foot to left foot) with its Jacobian; eqs. (6) and (7) of the paper."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lean_yaw_env.errors import FellError
-from lean_yaw_env.kernel.jacobian import step_jacobian
+from lean_yaw_env.kernel.jacobian import INPUTS, step_jacobian
 from lean_yaw_env.kernel.records import Command
 from lean_yaw_env.parameters import (
     INTER_LEG_ANGLE,
@@ -51,21 +51,43 @@ class StrideJacobian:
 
 
 @dataclass(frozen=True)
-class Step:
-    """The derivatives of one walking step.
+class StepDerivatives:
+    """One walking step with its exact derivatives.
 
     Attributes
     ----------
-    state : shape (5,)
-    by_state : shape (5, 5)
-    by_inter_leg_angle, by_mass_offset, by_previous_offset : shape (5,)
+    outputs : shape (10,)
+        What comes out of the step, in the order of ``kernel.jacobian.OUTPUTS``.
+    jacobian : shape (10, 8) or (10, 14)
+        Its derivatives by the section state, the inter-leg angle, the mass offset, the offset before and, if asked for, the body's first
+        six constants.
     """
 
-    state: Vector
-    by_state: Vector
-    by_inter_leg_angle: Vector
-    by_mass_offset: Vector
-    by_previous_offset: Vector
+    outputs: Vector
+    jacobian: Vector
+
+    @property
+    def state(self) -> Vector:
+        """Section state after the step, shape (5,)."""
+        return self.outputs[:STATE_SIZE]
+
+    @property
+    def by_state(self) -> Vector:
+        """Of the section state by the section state, shape (5, 5)."""
+        return self.jacobian[:STATE_SIZE, :STATE_SIZE]
+
+    @property
+    def by_inter_leg_angle(self) -> Vector:
+        """Of the section state, shape (5,); the same of the two offsets."""
+        return self.jacobian[:STATE_SIZE, STATE_SIZE]
+
+    @property
+    def by_mass_offset(self) -> Vector:
+        return self.jacobian[:STATE_SIZE, STATE_SIZE + 1]
+
+    @property
+    def by_previous_offset(self) -> Vector:
+        return self.jacobian[:STATE_SIZE, STATE_SIZE + 2]
 
 
 def require_offsets(mass_offset: float | tuple[float, float]) -> tuple[float, float]:
@@ -74,7 +96,7 @@ def require_offsets(mass_offset: float | tuple[float, float]) -> tuple[float, fl
         if len(mass_offset) != 2:
             raise ValueError(
                 f"mass_offset must be a number or a pair (left foot's, right foot's), "
-                f"not {mass_offset!r}"
+                f"got {mass_offset!r}"
             )
         left, right = mass_offset
         return require_mass_offset(left, "left mass_offset"), require_mass_offset(
@@ -84,25 +106,28 @@ def require_offsets(mass_offset: float | tuple[float, float]) -> tuple[float, fl
     return both, both
 
 
-def differentiate_step(walker: Walker, state: ArrayLike, stance: Foot, command: Command) -> Step:
+def differentiate_step(
+    walker: Walker, state: ArrayLike, stance: Foot, command: Command, *, with_body: bool = False
+) -> StepDerivatives:
     """One walking step with its exact derivatives (complex step through the kernel; the landing time's share included).
 
     Raises
     ------
     FellError
         If the walker does not complete the step; names the way it fell.
+    SolverError
+        If the integrator fails.
     """
     start = require_state(state)
-    status, outputs, rows = step_jacobian(
-        walker.parameters.body(), command, start, SIDE[stance], inputs=8
-    )
+    body = walker.parameters.body()
+    inputs = len(INPUTS) if with_body else STATE_SIZE + len(command)
+    status, outputs, rows = step_jacobian(body, command, start, SIDE[stance], inputs)
     raise_for_failure(status, start, walker.parameters)
     if status in FALL_OF_STATUS:
         raise FellError(
             f"the walker fell {FALL_OF_STATUS[status].value} in the step on its {stance} foot"
         )
-    by_state, by_command = rows[:STATE_SIZE, :STATE_SIZE], rows[:STATE_SIZE, STATE_SIZE:]
-    return Step(outputs[:STATE_SIZE], by_state, *by_command.T)
+    return StepDerivatives(outputs, rows)
 
 
 def stride_map(

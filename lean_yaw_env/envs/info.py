@@ -1,152 +1,247 @@
-"""What ``info`` tells: one table of names and where each number comes from, filled in one compiled call for one walker or many."""
+"""What ``info`` tells: one table of names, meanings and where each number is read, for one walker and for many.
+
+A step's numbers are written to a row for each walker, by code that is compiled from the table into each task's ``judge``.
+"""
 
 from __future__ import annotations
 
+import sys
+from collections import deque
 from enum import IntEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lean_yaw_env.envs import columns as c
-from lean_yaw_env.envs.options import BODY_NAMES
-from lean_yaw_env.envs.tasks import Task
-from lean_yaw_env.kernel.compilation import entry_point
-from lean_yaw_env.kernel.records import Outcome
-from lean_yaw_env.parameters import STATE_SIZE, Vector
-from lean_yaw_env.threads import share_out
+from lean_yaw_env.envs.state import BODY_NAMES, WALKER_FIELDS
+from lean_yaw_env.kernel import records
+from lean_yaw_env.kernel.compilation import written_formula
+from lean_yaw_env.parameters import STATE_FIELDS, STATE_SIZE, Vector
 from lean_yaw_env.walker import FALL_OF_STATUS
 
 
-class Source(IntEnum):
-    """Where a number of ``info`` is read."""
-
-    MEMORY = 0
-    OUTCOME = 1
-    QUOTIENT = 2
-    SPEED = 3
+Flags = NDArray[np.bool_]
 
 
-_MEMORY_FIELDS = (
-    ("stance_side", c.SIDE),
-    ("mass_offset", c.OFFSET),
-    ("inter_leg_angle", c.INTER_LEG_ANGLE),
-    ("commanded_offset", c.COMMANDED_OFFSET),
-    ("time", c.TIME),
-    ("steps", c.STEPS),
-    ("distance", c.DISTANCE),
+class FallCode(IntEnum):
+    """How a step ended, as ``info["fall"]`` tells it; the falls are described in ``lean_yaw_env.Fall``."""
+
+    NONE = 0
+    """The walker walks on."""
+    BACKWARD = int(records.BACKWARD - records.STEPPED)
+    SIDEWAYS = int(records.SIDEWAYS - records.STEPPED)
+    TRIP = int(records.TRIP - records.STEPPED)
+    LIFT_OFF = int(records.LIFT_OFF - records.STEPPED)
+    SLIP = int(records.SLIP - records.STEPPED)
+    NO_HEEL_STRIKE = int(records.NO_STRIKE - records.STEPPED)
+    SOLVER = int(records.FAILED - records.STEPPED)
+    """No fall: the integrator gave the step up, and the episode ends where the step began."""
+
+    @property
+    def word(self) -> str | None:
+        """The fall's name as ``lean_yaw_env.Fall`` has it, "solver", or None for no fall."""
+        if self is FallCode.SOLVER:
+            return "solver"
+        fall = FALL_OF_STATUS.get(float(self) + records.STEPPED)
+        return None if fall is None else fall.value
+
+
+class Info(NamedTuple):
+    """One key of ``info``: the expression in ``walker`` and ``task`` that gives its number, and what it means."""
+
+    key: str
+    source: str
+    meaning: str
+
+
+STATE_MEANING = "section state (5,), not mirrored, after the push if there is one"
+FOOTPRINT_MEANING = (
+    "contact reference point of the stance foot (2,): downhill, right, from the start, in leg lengths"
 )
-_OUTCOME_FIELDS = (
-    "duration",
-    "least_normal_force",
-    "greatest_friction",
-    "gravity_work",
-    "shift_work",
-    "impact_loss",
-    "ankle_loss",
+_ARRAYS = (*(f"walker.{field.name}" for field in STATE_FIELDS), "walker.place_x", "walker.place_z")
+_FOOTPRINT = slice(STATE_SIZE, STATE_SIZE + 2)
+_FIRST_NUMBER = STATE_SIZE + 2
+_MOST_PAGES = 3  # looked through: who keeps the infos of many steps gets new pages anyway
+
+COMMON_INFOS = (
+    Info("stance_side", "walker.side", "+1 while the left foot stands, -1 the right"),
+    Info(
+        "mass_offset",
+        "walker.mass_offset",
+        "offset in force, leg lengths, positive to the right",
+    ),
+    Info("inter_leg_angle", "walker.inter_leg_angle", "commanded in the last step, rad"),
+    Info("commanded_offset", "walker.commanded_offset", "commanded in the last step"),
+    Info("time", "walker.time", "since the start of the episode"),
+    Info("steps", "walker.steps", "since the start of the episode"),
+    Info(
+        "distance",
+        "walker.distance",
+        "sum of the steps' advances along the mean heading of their two footprints",
+    ),
+    Info("duration", "walker.duration", "of the last step"),
+    Info("least_normal_force", "walker.least_normal_force", "of the last step, in weights"),
+    Info(
+        "greatest_friction",
+        "walker.greatest_friction",
+        "of the last step, tangential over normal force",
+    ),
+    Info("gravity_work", "walker.gravity_work", "of the last step, in weight times leg length"),
+    Info("shift_work", "walker.shift_work", "of the last step, put in by moving the masses"),
+    Info("impact_loss", "walker.impact_loss", "of the last step"),
+    Info("ankle_loss", "walker.ankle_loss", "of the last step, into the ankle's spring and damper"),
+    Info("speed", "walker.speed", "advance over duration of the last completed step"),
 )
-_FIRST_SCALAR = STATE_SIZE + 2  # after the state and the footprint
+FALL_INFO = Info(
+    "fall",
+    "walker.fall",
+    "how the last step ended, as an integer: "
+    + ", ".join(f"{code.value} {code.word or 'none'}" for code in FallCode),
+)
+PUSH_INFOS = tuple(
+    Info(f"{name}_push", f"walker.{name}_push", f"the last push on the {name} rate; with pushes")
+    for name in ("pitch", "ankle")
+)
+BODY_INFOS = tuple(
+    Info(name, f"walker.{name}", "of this episode's body; with random bodies")
+    for name in BODY_NAMES
+)
+HEADING_INFO = Info("commanded_heading", "", "rad; of tasks that command one")
+_WALKER_NAMES = {field.name for field in WALKER_FIELDS}
 
 
-class InfoTable:
-    """The numbers of ``info`` for a task and its settings, in order.
+def _read(name: str) -> str:
+    return f"walker.{name}" if name in _WALKER_NAMES else f"task.{name}"
 
-    ``state`` (5,) and ``footprint`` (2,) come first, then scalars: see ``describe``. ``fall`` is the way the walker fell in this step, or None.
+
+def _metric(key: str, metric: Any) -> Info:
+    source = _read(metric.field)
+    if metric.divisor is not None:
+        divisor = _read(metric.divisor)
+        source = f"{source} / {divisor} if {divisor} > 0 else 0.0"
+    return Info(key, source, metric.meaning)
+
+
+def infos_of(task: Any) -> tuple[Info, ...]:
+    """The numbers that a task tells beside state, footprint and fall: those of pushes first, those of bodies last."""
+    heading = () if task.heading_field is None else (task.heading_field,)
+    common = {info.key for info in COMMON_INFOS}
+    return (
+        *PUSH_INFOS,
+        *COMMON_INFOS,
+        *(_metric(key, metric) for key, metric in task.metrics.items() if key not in common),
+        *(HEADING_INFO._replace(source=_read(name)) for name in heading),
+        *BODY_INFOS,
+    )
+
+
+def info_size(task: Any) -> int:
+    """How many numbers a walker's row of infos holds."""
+    return _FIRST_NUMBER + len(infos_of(task))
+
+
+def info_report(task: Any) -> Any:
+    """The formula ``report(row, walker, task)`` that fills such a row: state, footprint, ``infos_of``."""
+    sources = [*_ARRAYS, *(info.source for info in infos_of(task))]
+    lines = [f"row[{k}] = {source}" for k, source in enumerate(sources)]
+    return written_formula("report", ("row", "walker", "task"), lines)
+
+
+class InfoMaker:
+    """Makes ``info`` dictionaries of a task's rows of infos.
+
+    Parameters
+    ----------
+    task : Task
+    has_pushes, has_bodies : bool
+        Whether the environment tells the last push, and the walker's body.
     """
 
-    def __init__(self, task: Task, settings: Vector) -> None:
-        rows = [(Source.MEMORY, k, 0) for k in range(STATE_SIZE)]
-        rows += [(Source.MEMORY, c.PLACE_X, 0), (Source.MEMORY, c.PLACE_Z, 0)]
-        names: list[str] = []
-        for name, column in _MEMORY_FIELDS:
-            names.append(name)
-            rows.append((Source.MEMORY, column, 0))
-        for name in _OUTCOME_FIELDS:
-            names.append(name)
-            rows.append((Source.OUTCOME, Outcome._fields.index(name), 0))
-        names.append("speed")
-        rows.append((Source.SPEED, 0, 0))
-        for name, metric in task.metrics.items():
-            names.append(name)
-            kind = Source.MEMORY if metric.divisor is None else Source.QUOTIENT
-            rows.append((kind, metric.column, metric.divisor or 0))
-        memory_fields: list[tuple[str, int]] = []
-        if task.command_column is not None:
-            memory_fields.append(("commanded_heading", task.command_column))
-        if settings[c.PITCH_PUSH_SIZE] > 0.0 or settings[c.ANKLE_PUSH_SIZE] > 0.0:
-            memory_fields += [("pitch_push", c.PITCH_PUSH), ("ankle_push", c.ANKLE_PUSH)]
-        if settings[c.BODY_DRAW] > 0.0:
-            memory_fields += [(name, c.BODY + k) for k, name in enumerate(BODY_NAMES)]
-        for name, column in memory_fields:
-            names.append(name)
-            rows.append((Source.MEMORY, column, 0))
-        self.names = tuple(names)
-        self.sources = np.array(rows, dtype=np.int64)
-        keys = ("state", "footprint", *names, "fall")
-        self._masks = tuple(f"_{key}" for key in keys)
-        self._template: dict[str, Any] = dict.fromkeys(keys)
+    def __init__(self, task: Any, *, has_pushes: bool, has_bodies: bool) -> None:
+        self.size = info_size(task)
+        infos = infos_of(task)
+        first = 0 if has_pushes else len(PUSH_INFOS)
+        last = len(infos) - (0 if has_bodies else len(BODY_INFOS))
+        self._columns = slice(_FIRST_NUMBER + first, _FIRST_NUMBER + last)
+        self._names = tuple(info.key for info in infos[first:last])
+        self._masks = tuple(f"_{key}" for key in (*self._names, "state", "footprint", "fall"))
 
-    def fill(self, memory: Vector, outcomes: Vector, threads: int = 1) -> Vector:
-        """A fresh array (numbers, walkers)."""
-        n = len(memory)
-        table = np.empty((len(self.sources), n))
-        if threads == 1 or n < _WORTH_SHARING:
-            fill_info(table, memory, outcomes, self.sources, 0, n)
-        else:
-            share_out(
-                lambda first, last: fill_info(table, memory, outcomes, self.sources, first, last),
-                n,
-                threads,
-            )
-        return table
+    def views(self, row: Vector) -> tuple[Vector, Vector, Vector]:
+        """Of a walker's row: the numbers that are told one by one, the state, the footprint."""
+        return row[self._columns], row[:STATE_SIZE], row[_FOOTPRINT]
 
-    def one(self, table: Vector, status: float) -> dict[str, Any]:
-        """The info of a single environment."""
-        column = table[:, 0]
-        info = self._template.copy()  # a copy that is filled is quicker than a dict that grows
-        info.update(zip(self.names, column[_FIRST_SCALAR:].tolist(), strict=True))
-        info["state"] = column[:STATE_SIZE]
-        info["footprint"] = column[STATE_SIZE:_FIRST_SCALAR]
-        fall = FALL_OF_STATUS.get(status)
-        if fall is not None:
-            info["fall"] = fall.value
+    def one(self, views: tuple[Vector, Vector, Vector], fall: np.int64) -> dict[str, Any]:
+        """The info of a single environment: NumPy's numbers and two arrays."""
+        numbers, state, footprint = views
+        info: dict[str, Any] = dict(zip(self._names, numbers, strict=False))
+        info["state"] = state.copy()
+        info["footprint"] = footprint.copy()
+        info["fall"] = fall
         return info
 
-    def many(self, table: Vector, statuses: Vector, mask: NDArray[np.bool_]) -> dict[str, Any]:
-        """The infos of a vector environment, each key beside its mask; numbers outside the mask are zero."""
-        if not mask.all():
-            table[:, ~mask] = 0.0
-        falls = np.full(len(mask), None, dtype=object)
-        for i in np.flatnonzero((statuses > _STEPPED) & mask):
-            falls[i] = FALL_OF_STATUS[statuses[i]].value
-        info: dict[str, Any] = {
-            "state": table[:STATE_SIZE].T,
-            "footprint": table[STATE_SIZE:_FIRST_SCALAR].T,
-            **dict(zip(self.names, table[_FIRST_SCALAR:], strict=True)),
-            "fall": falls,
-        }
-        info.update(dict.fromkeys(self._masks, mask))
+    def many(
+        self, table: Vector, falls: NDArray[np.int64], mask: Flags
+    ) -> dict[str, Any]:
+        """The infos of a vector environment, views of its table (n, size), each key beside its mask."""
+        info: dict[str, Any] = dict.fromkeys(self._masks, mask)
+        info.update(zip(self._names, table.T[self._columns], strict=False))
+        info["state"] = table[:, :STATE_SIZE]
+        info["footprint"] = table[:, _FOOTPRINT]
+        info["fall"] = falls
         return info
 
 
-_STEPPED = 2.0
-# Copying a walker's numbers takes a fifth of its step's time: fewer walkers than these are copied while a helper wakes up.
-_WORTH_SHARING = 8192
-_MEMORY, _OUTCOME, _QUOTIENT = (int(s) for s in (Source.MEMORY, Source.OUTCOME, Source.QUOTIENT))
+class InfoPage:
+    """A table of infos of all of n walkers, and the views of it that an ``info`` hands out: made once, used for step after step.
+
+    To make the views anew takes as long as stepping a dozen walkers. ``is_free`` tells whether the arrays of an earlier ``info`` are in nobody's
+    hands any more; a view of one of them, or a tensor that shares its memory, counts as well.
+    """
+
+    def __init__(self, maker: InfoMaker, n: int) -> None:
+        everyone = np.ones(n, dtype=np.bool_)
+        everyone.flags.writeable = False
+        self.table = np.empty((n, maker.size))
+        self._falls = np.zeros(n, dtype=np.int64)
+        self._info = maker.many(self.table, self._falls, everyone)
+        told = [array for key, array in self._info.items() if not key.startswith("_")]
+        self._arrays = [self.table, *told]
+        del told
+        self._references = self._count()
+
+    def is_free(self) -> bool:
+        """Whether nobody but this page holds its arrays."""
+        return self._count() == self._references
+
+    def info(self, falls: NDArray[np.int64]) -> dict[str, Any]:
+        """The ``info`` of the table as it is filled."""
+        self._falls[:] = falls
+        return self._info.copy()
+
+    def _count(self) -> int:
+        return sum(map(sys.getrefcount, self._arrays))
 
 
-@entry_point()
-def fill_info(table, memory, outcomes, sources, first, last):
-    """Fill ``table`` (numbers, walkers) from the rows that ``sources`` names, for walkers ``first`` to ``last`` - 1."""
-    for k in range(sources.shape[0]):
-        kind, a, b = sources[k, 0], sources[k, 1], sources[k, 2]
-        for i in range(first, last):
-            if kind == _MEMORY:
-                table[k, i] = memory[i, a]
-            elif kind == _OUTCOME:
-                table[k, i] = outcomes[i, a]
-            elif kind == _QUOTIENT:
-                table[k, i] = memory[i, a] / memory[i, b] if memory[i, b] > 0.0 else 0.0
-            else:
-                duration = outcomes[i, c.OUTCOME_DURATION]
-                table[k, i] = memory[i, c.ADVANCE] / duration if duration > 0.0 else 0.0
+class InfoPages:
+    """As many pages as are in use at a time.
+
+    Parameters
+    ----------
+    maker : InfoMaker
+    n : int
+        Walkers.
+    """
+
+    def __init__(self, maker: InfoMaker, n: int) -> None:
+        self._maker = maker
+        self._n = n
+        self._pages: deque[InfoPage] = deque(maxlen=_MOST_PAGES)
+
+    def take(self) -> InfoPage:
+        """A page to fill: one that is free again, or a new one."""
+        for page in self._pages:
+            if page.is_free():
+                return page
+        page = InfoPage(self._maker, self._n)
+        self._pages.append(page)
+        return page

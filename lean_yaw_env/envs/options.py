@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any, Literal
 
@@ -12,43 +13,34 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from lean_yaw_env.analysis import find_gait
-from lean_yaw_env.envs import columns as c
+from lean_yaw_env.envs.dynamics import ANKLE_PUSH, PITCH_PUSH
+from lean_yaw_env.envs.observation import COMMON_NAMES, OBSERVATION_LIMIT, STANCE_FOOT
+from lean_yaw_env.envs.reset import BODY_DEVIATIONS, HELD_OUT_REACH, BodyDraw
+from lean_yaw_env.envs.state import BODY_NAMES, SETTINGS, Records
 from lean_yaw_env.envs.tasks import Task
-from lean_yaw_env.envs.transition import (
-    ANKLE_PUSH,
-    BODY_DEVIATIONS,
-    HELD_OUT,
-    HELD_OUT_REACH,
-    NOMINAL,
-    OBSERVATION_LIMIT,
-    PITCH_PUSH,
-    TRAINING,
-)
-from lean_yaw_env.parameters import (
-    INTER_LEG_ANGLE,
-    PARAMETER_NAMES,
-    QUARTER_TURN,
-    STATE_FIELDS,
-    Vector,
-    WalkerParameters,
-    require_number,
-)
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, QUARTER_TURN, WalkerParameters
+from lean_yaw_env.validation import require_flag, require_number, suggestion
 from lean_yaw_env.walker import Walker
 
 RandomBody = Literal["training", "held-out"]
-BODY_NAMES = PARAMETER_NAMES[: c.BODY_COLUMNS]
-"""What a random body draws."""
-_BODY_DRAWS: dict[str | None, float] = {None: NOMINAL, "training": TRAINING, "held-out": HELD_OUT}
+_BODY_DRAWS: dict[str | None, BodyDraw] = {
+    None: BodyDraw.NOMINAL,
+    "training": BodyDraw.TRAINING,
+    "held-out": BodyDraw.HELD_OUT,
+}
+_NO_LIMIT = 2**62  # steps
 
 
 @dataclass(frozen=True)
 class EnvOptions:
-    """An environment's constructor arguments, the same for one walker and for many. None changes the shape of actions or observations.
+    """An environment's constructor arguments, the same for one walker and for many.
+
+    No option changes the shape of actions. None but ``mirror`` changes the shape of observations: ``mirror=False`` adds the stance foot.
 
     Parameters
     ----------
-    parameters : WalkerParameters, optional
-        The walker and its slope; the task's default otherwise.
+    parameters : WalkerParameters or a mapping of their names to numbers, optional
+        The walker and its slope; the task's default otherwise. A mapping can be kept as JSON with the environment's spec.
     slope : [-0.5, 0.5], optional
         In place of the parameters' slope, rad.
     friction_limit : (0, inf], optional
@@ -61,11 +53,11 @@ class EnvOptions:
         Largest change of the offset in a step; the task's default otherwise. The tasks of steering down a slope keep it gentle, 0.005,
         as the paper does: larger ones let a policy power the walk by pumping.
     horizon : (0, inf], optional
-        Simulated time after which an episode is truncated.
+        Simulated time after which an episode is truncated; the task's default otherwise.
     start_disturbance : [0, 5]
-        Scales the random deviations of the start (``transition.START_DEVIATIONS``); 0 starts exactly in the gait, on either foot.
+        Scales the random deviations of the start (``reset.START_DEVIATIONS``); 0 starts exactly in the gait, on either foot.
     mirror : bool
-        Show and command a right stance as its mirror image, so that a policy learns one foot.
+        Show and command a right stance as its mirror image, so that a policy learns one foot. Without, observations tell the stance foot.
     sensor_noise : [0, 10]
         Standard deviation of noise on every number observed but the stance foot, in units of the observation.
     action_delay : bool
@@ -73,7 +65,7 @@ class EnvOptions:
     hidden_rates : bool
         Show both rates as zero.
     random_body : None, "training" or "held-out"
-        Draw hip width, foot radius, ankle tilt and slope anew for each episode, uniformly within ``transition.BODY_DEVIATIONS`` of the
+        Draw hip width, foot radius, ankle tilt and slope anew for each episode, uniformly within ``reset.BODY_DEVIATIONS`` of the
         parameters' for training, or outside that box but within one 1.5 times as large. The start is near the parameters' own gait; ``info``
         tells the body, the observation does not.
     push_level : [0, 10], optional
@@ -86,7 +78,7 @@ class EnvOptions:
         If a value is outside its range.
     """
 
-    parameters: WalkerParameters | None = None
+    parameters: WalkerParameters | Mapping[str, Any] | None = None
     inter_leg_angle_range: float = 0.15
     mass_offset_range: float = 0.05
     max_offset_change: float | None = None
@@ -102,91 +94,101 @@ class EnvOptions:
     push_level: float | None = None
 
     def __post_init__(self) -> None:
-        if self.parameters is not None and not isinstance(self.parameters, WalkerParameters):
-            raise ValueError(f"parameters must be WalkerParameters, not {self.parameters!r}")
-        least = min(INTER_LEG_ANGLE, QUARTER_TURN - INTER_LEG_ANGLE)
-        require_number("inter_leg_angle_range", self.inter_leg_angle_range, 0.0, least, "[)")
-        require_number("mass_offset_range", self.mass_offset_range, 0.0, 1.0)
-        require_number("start_disturbance", self.start_disturbance, 0.0, 5.0)
-        if self.max_offset_change is not None:
-            require_number("max_offset_change", self.max_offset_change, 0.0, 2.0)
-        if self.horizon is not None:
-            require_number("horizon", self.horizon, 0.0, math.inf, "(]")
-        if self.slope is not None:
-            require_number("slope", self.slope, -0.5, 0.5)
-        if self.friction_limit is not None:
-            require_number("friction_limit", self.friction_limit, 0.0, math.inf, "(]")
-        require_number("sensor_noise", self.sensor_noise, 0.0, 10.0)
-        if self.push_level is not None:
-            require_number("push_level", self.push_level, 0.0, 10.0)
+        object.__setattr__(self, "parameters", _parameters(self.parameters))
+        for name, low, high, bounds in _RANGES:
+            require_number(name, getattr(self, name), low, high, bounds)
+        for name, low, high, bounds in _OPTIONAL_RANGES:
+            if getattr(self, name) is not None:
+                require_number(name, getattr(self, name), low, high, bounds)
         for name in ("mirror", "action_delay", "hidden_rates"):
-            if not isinstance(getattr(self, name), (bool, np.bool_)):
-                raise ValueError(f"{name} must be True or False, not {getattr(self, name)!r}")
-        if not (self.random_body is None or isinstance(self.random_body, str)) or (
-            self.random_body not in _BODY_DRAWS
-        ):
-            raise ValueError(
-                f"random_body must be None, 'training' or 'held-out', not {self.random_body!r}"
-            )
+            require_flag(name, getattr(self, name))
+        if self.random_body is not None:
+            _require_random_body(self.random_body)
+
+    @classmethod
+    def of(cls, arguments: Mapping[str, Any]) -> EnvOptions:
+        """Options from an environment's keyword arguments, or ``TypeError`` naming one that there is not, and the nearest that there is."""
+        known = [field.name for field in fields(cls)]
+        for name in arguments:
+            if name not in known:
+                raise TypeError(f"option {name!r} is unknown{suggestion(name, known)}")
+        return cls(**arguments)
+
+    def for_task(self, task: Task) -> TaskOptions:
+        """These options with the task's defaults in the place of None, and slope and friction limit among the parameters."""
+        parameters = task.parameters if self.parameters is None else self.parameters
+        assert isinstance(parameters, WalkerParameters)
+        replaced = {
+            name: getattr(self, name)
+            for name in ("slope", "friction_limit")
+            if getattr(self, name) is not None
+        }
+        return TaskOptions(
+            parameters=replace(parameters, **replaced),
+            max_offset_change=_given(self.max_offset_change, task.max_offset_change),
+            horizon=_given(self.horizon, task.horizon),
+            push_level=_given(self.push_level, task.push_level),
+        )
 
     def walker_parameters(self, task: Task) -> WalkerParameters:
         """The walker and its slope; of random bodies, the middle."""
-        parameters = task.parameters if self.parameters is None else self.parameters
-        if self.slope is not None:
-            parameters = replace(parameters, slope=self.slope)
-        if self.friction_limit is not None:
-            parameters = replace(parameters, friction_limit=self.friction_limit)
-        return parameters
-
-    def settings(self, task: Task) -> Vector:
-        """The options as the row of numbers that compiled steps read (``columns``).
-
-        Raises
-        ------
-        NoGaitError
-            If the walker has no gait to start from.
-        ValueError
-            If the box of random bodies holds impossible ones.
-        """
-        parameters = self.walker_parameters(task)
-        push = task.push_level if self.push_level is None else self.push_level
-        change = (
-            task.max_offset_change if self.max_offset_change is None else self.max_offset_change
-        )
-        horizon = task.horizon if self.horizon is None else self.horizon
-        row = np.zeros(c.SETTINGS)
-        row[c.BASE_ANGLE] = INTER_LEG_ANGLE
-        row[c.ANGLE_RANGE] = self.inter_leg_angle_range
-        row[c.OFFSET_RANGE] = self.mass_offset_range
-        row[c.OFFSET_CHANGE] = change
-        row[c.HORIZON] = horizon
-        row[c.MIRRORED] = 1.0 if self.mirror else 0.0
-        row[c.DISTURBANCE] = self.start_disturbance
-        row[c.BODY_DRAW] = _BODY_DRAWS[self.random_body]
-        if self.random_body is not None:
-            row[c.BODY_CENTRE : c.BODY_REACH] = _require_body_box(parameters)
-            row[c.BODY_REACH : c.TASK_CONSTANTS] = BODY_DEVIATIONS
-        row[c.GAIT : c.GAIT_OFFSET] = gait_of(parameters, task.pumping)
-        row[c.GAIT_OFFSET] = 0.0 - task.pumping
-        row[c.DELAYED] = self.action_delay
-        row[c.NOISE] = self.sensor_noise
-        row[c.HIDES_RATES] = self.hidden_rates
-        row[c.HIDES_HEADING] = parameters.slope_turns
-        row[c.PITCH_PUSH_SIZE] = push * PITCH_PUSH
-        row[c.ANKLE_PUSH_SIZE] = push * ANKLE_PUSH
-        row[c.TASK_CONSTANTS : c.TASK_CONSTANTS + len(task.constants)] = task.constants
-        return row
+        return self.for_task(task).parameters
 
     def observation_names(self, task: Task) -> tuple[str, ...]:
         """What each number of an observation is."""
-        foot = () if self.mirror else ("stance_foot",)
-        features = (feature.name for feature in task.features)
-        return (*(field.name for field in STATE_FIELDS), "mass_offset", *foot, *features)
+        common = COMMON_NAMES[:STANCE_FOOT] if self.mirror else COMMON_NAMES
+        return (*common, *(feature.name for feature in task.observed))
 
     def observation_space(self, task: Task) -> spaces.Space[NDArray[np.float32]]:
+        """A box as large as ``observation_names``."""
         size = len(self.observation_names(task))
         box: Any = spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (size,), np.float32)
         return box
+
+
+@dataclass(frozen=True)
+class TaskOptions:
+    """The options that have a default of each task's own, as they are in force."""
+
+    parameters: WalkerParameters
+    max_offset_change: float
+    horizon: float
+    push_level: float
+
+
+def settings_of(
+    options: EnvOptions, task: Task, *, max_episode_steps: int | None = None
+) -> Records:
+    """The record of settings (1,) that compiled steps read.
+
+    Raises
+    ------
+    NoGaitError
+        If the walker has no gait to start from.
+    ValueError
+        If the box of random bodies holds impossible ones.
+    """
+    own = options.for_task(task)
+    record = np.zeros(1, SETTINGS)
+    record["inter_leg_angle"] = INTER_LEG_ANGLE
+    for name in (
+        "inter_leg_angle_range", "mass_offset_range", "mirror", "action_delay", "sensor_noise",
+        "hidden_rates", "start_disturbance",
+    ):  # fmt: skip
+        record[name] = getattr(options, name)
+    record["max_offset_change"] = own.max_offset_change
+    record["horizon"] = own.horizon
+    record["max_episode_steps"] = _NO_LIMIT if max_episode_steps is None else max_episode_steps
+    record["hidden_heading"] = own.parameters.slope_turns
+    record["pitch_push"] = own.push_level * PITCH_PUSH
+    record["ankle_push"] = own.push_level * ANKLE_PUSH
+    record["random_body"] = _BODY_DRAWS[options.random_body]
+    if options.random_body is not None:
+        record["body_centre"] = _require_body_box(own.parameters)
+        record["body_reach"] = BODY_DEVIATIONS
+    record["gait"] = gait_of(own.parameters, task.pumping)
+    record["gait_offset"] = 0.0 - task.pumping
+    return record
 
 
 ACTION_SIZE = 2
@@ -207,6 +209,52 @@ def gait_of(parameters: WalkerParameters, pumping: float = 0.0) -> tuple[float, 
     offset = (pumping, -pumping) if pumping else 0.0
     walker = Walker(replace(parameters, friction_limit=math.inf))
     return tuple(find_gait(walker, mass_offset=offset).tolist())
+
+
+_RANGES = (
+    (
+        "inter_leg_angle_range",
+        0.0,
+        min(INTER_LEG_ANGLE, QUARTER_TURN - INTER_LEG_ANGLE),
+        "[)",
+    ),
+    ("mass_offset_range", 0.0, 1.0, "[]"),
+    ("start_disturbance", 0.0, 5.0, "[]"),
+    ("sensor_noise", 0.0, 10.0, "[]"),
+)
+_OPTIONAL_RANGES = (
+    ("max_offset_change", 0.0, 2.0, "[]"),
+    ("horizon", 0.0, math.inf, "(]"),
+    ("slope", -0.5, 0.5, "[]"),
+    ("friction_limit", 0.0, math.inf, "(]"),
+    ("push_level", 0.0, 10.0, "[]"),
+)
+
+
+def _require_random_body(value: Any) -> None:
+    kinds = [kind for kind in _BODY_DRAWS if kind is not None]
+    if not isinstance(value, str) or value not in kinds:
+        raise ValueError(
+            f"random_body must be None or one of {', '.join(kinds)}, got {value!r}{suggestion(value, kinds)}"
+        )
+
+
+def _given(value: float | None, default: float) -> float:
+    return default if value is None else value
+
+
+def _parameters(value: Any) -> WalkerParameters | None:
+    if value is None or isinstance(value, WalkerParameters):
+        return value
+    if not isinstance(value, Mapping):
+        raise ValueError(
+            f"parameters must be WalkerParameters or a mapping of their names, got {value!r}"
+        )
+    known = [field.name for field in fields(WalkerParameters)]
+    for name in value:
+        if name not in known:
+            raise ValueError(f"parameters has no {name!r}{suggestion(name, known)}")
+    return WalkerParameters(**value)
 
 
 def _require_body_box(parameters: WalkerParameters) -> tuple[float, ...]:

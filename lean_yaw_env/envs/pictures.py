@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
-from lean_yaw_env.envs import columns as c
-from lean_yaw_env.envs.rows import WalkerRows
-from lean_yaw_env.parameters import STATE_SIZE, Foot, Vector
+from lean_yaw_env.envs.formulas import mean_heading
+from lean_yaw_env.envs.simulation import Simulation
+from lean_yaw_env.parameters import Foot, Vector
 from lean_yaw_env.rendering.geometry import Pose, walker_shape
 from lean_yaw_env.rendering.scene import Goal, Scene, status_lines
 
 
 class Footage:
-    """Footprints and the centre of mass's path of row 0, and scenes made of them."""
+    """Footprints and the centre of mass's path of one walker, the first by default, and scenes made of them."""
 
-    def __init__(self, rows: WalkerRows) -> None:
-        self._rows = rows
+    def __init__(self, simulation: Simulation, row: int = 0) -> None:
+        self._simulation = simulation
+        self._row = row
         self.restart()
 
     def restart(self) -> None:
-        self._footprints: list[Vector] = []
+        """Forget the walk so far."""
+        self._footprints: list[tuple[float, float]] = []
         self._headings: list[float] = []
         self._feet: list[Foot] = []
         self._path: list[Vector] = []
@@ -29,39 +32,41 @@ class Footage:
         self.extend()
 
     def extend(self) -> None:
-        """Take in the step that row 0 has just made."""
-        memory = self._rows.memory[0]
-        self._footprints.append(memory[[c.PLACE_X, c.PLACE_Z]])
-        self._headings.append(float(memory[c.HEADING]))
-        self._feet.append(self._foot())
-        centre = walker_shape(self._rows.body_parameters(0), self._pose()).centre
+        """Take in the step that the walker has just made."""
+        walker, task = self._simulation.records(self._row)
+        pose = self._pose(walker)
+        self._footprints.append((float(walker.place_x), float(walker.place_z)))
+        self._headings.append(float(walker.heading))
+        self._feet.append(pose.stance)
+        centre = walker_shape(self._simulation.body_parameters(self._row), pose).centre
         self._path.append(centre[[0, 2]])
-        columns = self._rows.task.goal_columns
-        if columns is not None:
-            place = (float(memory[columns[0]]), float(memory[columns[1]]))
+        fields = self._simulation.task.goal_fields
+        if fields is not None:
+            place = (float(task[fields[0]]), float(task[fields[1]]))
             if place not in self._goal_places[-1:]:
                 self._goal_places.append(place)
 
     def scene(self, fall: str | None) -> Scene:
-        memory = self._rows.memory[0]
-        task = self._rows.task
-        column = task.command_column
-        command = None if column is None else float(memory[column])
+        """What there is to draw; ``fall`` names how the walk ended, if it did."""
+        walker, task = self._simulation.records(self._row)
+        kind = self._simulation.task
+        command = None if kind.heading_field is None else float(task[kind.heading_field])
+        time = float(walker.time)
         return Scene(
-            parameters=self._rows.body_parameters(0),
-            pose=self._pose(),
+            parameters=self._simulation.body_parameters(self._row),
+            pose=self._pose(walker),
             footprints=np.array(self._footprints),
             headings=np.array(self._headings),
             feet=tuple(self._feet),
             path=np.array(self._path),
             commanded_heading=self._goal_direction() if command is None else command,
             goals=self._goals(),
-            reference_path=None if task.reference_path is None else task.reference_path(memory),
+            reference_path=None if kind.reference_path is None else kind.reference_path(walker, task),
             lines=status_lines(
-                step=int(memory[c.STEPS]),
-                time=float(memory[c.TIME]),
-                speed=float(memory[c.DISTANCE] / memory[c.TIME]) if memory[c.TIME] > 0.0 else None,
-                heading=float(0.5 * (memory[c.HEADING] + memory[c.PREVIOUS_HEADING])),
+                step=int(walker.steps),
+                time=time,
+                speed=float(walker.distance) / time if time > 0.0 else None,
+                heading=float(mean_heading(walker)),
                 commanded_heading=command,
                 status="walking" if fall is None else f"fell {fall}",
             ),
@@ -77,19 +82,15 @@ class Footage:
     def _goals(self) -> list[Goal]:
         """The goals reached so far, and the one in force."""
         return [
-            Goal(x, z, self._rows.task.goal_radius, reached=k < len(self._goal_places) - 1)
+            Goal(x, z, self._simulation.task.goal_radius, reached=k < len(self._goal_places) - 1)
             for k, (x, z) in enumerate(self._goal_places)
         ]
 
-    def _foot(self) -> Foot:
-        return "left" if self._rows.memory[0, c.SIDE] > 0.0 else "right"
-
-    def _pose(self) -> Pose:
-        memory = self._rows.memory[0]
+    def _pose(self, walker: Any) -> Pose:
         return Pose(
-            state=memory[:STATE_SIZE].copy(),
-            stance=self._foot(),
-            inter_leg_angle=float(memory[c.INTER_LEG_ANGLE]),
-            mass_offset=float(memory[c.OFFSET]),
-            contact=memory[[c.PLACE_X, c.PLACE_Z]],
+            state=self._simulation.states[self._row].copy(),
+            stance="left" if walker.side > 0.0 else "right",
+            inter_leg_angle=float(walker.inter_leg_angle),
+            mass_offset=float(walker.mass_offset),
+            contact=np.array([walker.place_x, walker.place_z]),
         )

@@ -11,13 +11,11 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from lean_yaw_env.envs import columns as c
+from lean_yaw_env.envs.snapshots import from_plain, plain
+from lean_yaw_env.envs.tasks import Task
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 
 _TRUNCATED = "TimeLimit.truncated"
-_ROW_ARRAYS = ("bodies", "memory", "stream", "actions", "outcomes", "observations")
-_WORDS = 6  # of 64 bits, that a PCG64 generator's state takes
-_WORD = 2**64
 
 
 class WalkerVecEnv(VecEnv):
@@ -31,7 +29,8 @@ class WalkerVecEnv(VecEnv):
     Parameters
     ----------
     num_envs : int >= 1
-    task : str
+    task : str or Task
+        A task's name, its environment id, or a task of your own.
     step_info : bool
         Fill every walker's info at every step, which costs far more than the step itself.
     threads : int >= 1
@@ -40,14 +39,14 @@ class WalkerVecEnv(VecEnv):
 
     Raises
     ------
-    ValueError, NoGaitError, SolverError
+    TypeError, ValueError, NoGaitError
         As ``WalkerVectorEnv``.
     """
 
     def __init__(
         self,
         num_envs: int,
-        task: str = "Heading",
+        task: str | Task = "Heading",
         *,
         step_info: bool = False,
         threads: int = 1,
@@ -61,6 +60,7 @@ class WalkerVecEnv(VecEnv):
             threads=threads,
             **options,
         )
+        self.walkers._tells_ends = True
         space = self.walkers.single_observation_space
         super().__init__(num_envs, space, self.walkers.single_action_space)
         self._step_info = step_info
@@ -106,7 +106,7 @@ class WalkerVecEnv(VecEnv):
         return observations, rewards.astype(np.float32), dones, infos
 
     def close(self) -> None:
-        """Stop the walkers' threads."""
+        """Close the walkers' environment; the threads of a process serve all its environments and stay."""
         self.walkers.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
@@ -118,7 +118,7 @@ class WalkerVecEnv(VecEnv):
         """Set an attribute of the walkers' common environment; ``ValueError`` for some of the walkers only."""
         if sorted(self._get_indices(indices)) != list(range(self.num_envs)):
             raise ValueError(
-                f"indices must be all {self.num_envs} walkers, which share {attr_name!r}, not {indices!r}"
+                f"indices must be all {self.num_envs} walkers, which share {attr_name!r}, got {indices!r}"
             )
         setattr(self.walkers, attr_name, value)
 
@@ -139,15 +139,17 @@ class WalkerVecEnv(VecEnv):
 
     def step_durations(self) -> NDArray[np.float64]:
         """How long each walker's last step took in simulated time, shape (num_envs,); 0 where it ended an episode."""
-        return self.walkers.rows.outcomes[:, c.OUTCOME_DURATION].copy()
+        return self.walkers.simulation.walkers["duration"].copy()
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
-        """Copies of all that the walkers' next steps depend on, as arrays; only after ``reset``."""
-        if self.walkers._generators is None:
-            raise RuntimeError("call reset() before snapshot()")
-        generators = [_generator_words(g) for g in self.walkers._generators]
-        return {name: array.copy() for name, array in self._arrays().items()} | {
-            "generators": np.array(generators, dtype=np.uint64)
+        """Copies of all that the walkers' next steps depend on, as plain arrays for a file; only after ``reset``.
+
+        ``walkers.get_state()`` has the same with names for every field.
+        """
+        return {
+            **plain(self.walkers.get_state()),
+            "episode_returns": self.episode_returns.copy(),
+            "episode_lengths": self.episode_lengths.copy(),
         }
 
     def restore(self, snapshot: dict[str, NDArray[Any]]) -> None:
@@ -158,24 +160,13 @@ class WalkerVecEnv(VecEnv):
         ValueError
             If it is a snapshot of other walkers; nothing has changed then.
         """
-        own = self._arrays()
-        shapes = {name: array.shape for name, array in own.items()}
-        shapes["generators"] = (self.num_envs, _WORDS)
-        found = {name: array.shape for name, array in snapshot.items()}
-        if found != shapes:
-            raise ValueError(f"snapshot must hold arrays of shapes {shapes}, not {found}")
-        for name, array in own.items():
-            array[:] = snapshot[name]
-        self.walkers._generators = [_generator_of(words) for words in snapshot["generators"]]
-
-    def _arrays(self) -> dict[str, NDArray[Any]]:
-        rows = self.walkers.rows
-        return {
-            **{name: getattr(rows, name) for name in _ROW_ARRAYS},
-            "ended": self.walkers._ended,
-            "episode_returns": self.episode_returns,
-            "episode_lengths": self.episode_lengths,
-        }
+        sums = {"episode_returns": self.episode_returns, "episode_lengths": self.episode_lengths}
+        for name, own in sums.items():
+            if name not in snapshot or snapshot[name].shape != own.shape:
+                raise ValueError(f"snapshot must hold {name!r} in shape {own.shape}")
+        self.walkers.set_state(from_plain(self.walkers.simulation, snapshot))
+        for name, own in sums.items():
+            own[:] = snapshot[name]
 
     def _reset_each(self, seeds: list[int | None] | None) -> NDArray[np.float32]:
         """Reset walkers that have options of their own, one after the other."""
@@ -211,27 +202,6 @@ class WalkerVecEnv(VecEnv):
 def _of_walker(info: dict[str, Any], i: int) -> dict[str, Any]:
     """One walker's share of a vector environment's info, as a single environment gives it."""
     return {
-        key: value[i].item() if isinstance(value[i], np.generic) else value[i]
-        for key, value in info.items()
-        if not key.startswith(("_", "final_"))
+        key: value[i] for key, value in info.items() if not key.startswith(("_", "final_"))
     }
 
-
-def _generator_words(generator: np.random.Generator) -> list[int]:
-    """The state of a PCG64 generator, as Gymnasium seeds them, in words of 64 bits."""
-    state = generator.bit_generator.state
-    words = [part for key in ("state", "inc") for part in divmod(state["state"][key], _WORD)]
-    return [*words, state["has_uint32"], state["uinteger"]]
-
-
-def _generator_of(words: NDArray[np.uint64]) -> np.random.Generator:
-    """The generator that ``_generator_words`` tells the state of."""
-    high, low, high_increment, low_increment, has_uint32, uinteger = (int(word) for word in words)
-    bits = np.random.PCG64()
-    bits.state = {
-        "bit_generator": "PCG64",
-        "state": {"state": high * _WORD + low, "inc": high_increment * _WORD + low_increment},
-        "has_uint32": has_uint32,
-        "uinteger": uinteger,
-    }
-    return np.random.Generator(bits)

@@ -12,12 +12,14 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from lean_yaw_env.envs import columns as c
+from lean_yaw_env.envs.info import InfoPages
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, action_space
-from lean_yaw_env.envs.rows import WalkerRows
-from lean_yaw_env.envs.tasks import task_named
-from lean_yaw_env.parameters import require_number
+from lean_yaw_env.envs.simulation import Simulation
+from lean_yaw_env.envs.snapshots import State, restore, state_of
+from lean_yaw_env.envs.tasks import Task, task_named
+from lean_yaw_env.parameters import Vector
 from lean_yaw_env.threads import share_out
+from lean_yaw_env.validation import require_count
 
 Observations = NDArray[np.float32]
 
@@ -28,7 +30,8 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
     Parameters
     ----------
     num_envs : int >= 1
-    task : str
+    task : str or Task
+        A task's name, its environment id, or a task of your own.
     autoreset_mode : AutoresetMode or its value
         ``NEXT_STEP`` (the default), ``SAME_STEP`` (the ended episode's last observation and info are ``final_obs`` and ``final_info``)
         or ``DISABLED`` (reset ended ones by ``options={"reset_mask": ...}``).
@@ -36,15 +39,17 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         Return fresh observations each step. Without, the same array is returned and overwritten by the next step; rewards, ends
         and infos are fresh in either case.
     step_info : bool
-        Fill ``info`` at every step. Without, only ``final_obs`` and ``final_info`` are filled, which saves a few per cent.
+        Fill ``info``. Without, resets and steps alike return no info but ``final_obs``, which saves a few per cent.
     threads : int >= 1
         Threads that share the walkers of a step; worth it from some thousands of walkers on.
+    max_episode_steps : int >= 1, optional
+        Steps after which an episode is truncated, besides the horizon of simulated time.
     **options
         See ``EnvOptions``.
 
     Raises
     ------
-    ValueError, NoGaitError, SolverError
+    TypeError, ValueError, NoGaitError
         As ``WalkerEnv``.
     """
 
@@ -53,37 +58,44 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
     def __init__(
         self,
         num_envs: int = 1,
-        task: str = "Heading",
+        task: str | Task = "Heading",
         *,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         copy: bool = True,
         step_info: bool = True,
         threads: int = 1,
+        max_episode_steps: int | None = None,
         render_mode: None = None,
         **options: Any,
     ) -> None:
         EzPickle.__init__(
             self, num_envs, task, autoreset_mode=autoreset_mode, copy=copy, step_info=step_info,
-            threads=threads, render_mode=render_mode, **options,
+            threads=threads, max_episode_steps=max_episode_steps, render_mode=render_mode, **options,
         )  # fmt: skip
-        self.num_envs = int(require_number("num_envs", num_envs, 1, 10_000_000))
-        self.threads = int(require_number("threads", threads, 1, 1024))
+        self.num_envs = require_count("num_envs", num_envs)
+        self.threads = require_count("threads", threads, 1, 1024)
+        if max_episode_steps is not None:
+            require_count("max_episode_steps", max_episode_steps)
         if render_mode is not None:
-            raise ValueError(f"render_mode must be None for many walkers, not {render_mode!r}")
+            raise ValueError(f"render_mode must be None for many walkers, got {render_mode!r}")
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {"autoreset_mode": self.autoreset_mode}
         self.render_mode = None
         self.copy = copy
         self.step_info = step_info
-        self.options = EnvOptions(**options)
+        self.options = EnvOptions.of(options)
         self.task = task_named(task)
-        self.rows = WalkerRows(self.task, self.options, self.num_envs)
+        self.simulation = Simulation(
+            self.task, self.options, self.num_envs, max_episode_steps=max_episode_steps
+        )
         self.single_observation_space = self.options.observation_space(self.task)
         self.single_action_space = action_space()
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._generators: list[np.random.Generator] | None = None
         self._ended = np.ones(self.num_envs, dtype=np.bool_)
+        self._tells_ends = step_info
+        self._pages = InfoPages(self.simulation.info, self.num_envs)
 
     def reset(
         self,
@@ -98,13 +110,13 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         """
         placement = dict(options or {})
         mask = self._reset_mask(placement.pop("reset_mask", None))
-        self.rows.check_options(placement)
+        self.simulation.check_options(placement)
         self._seed(seed, mask)
-        rows = np.flatnonzero(mask)
-        self._begin(rows)
+        infos = self.simulation.new_infos(cleared=True) if self.step_info else None
+        self._begin(mask, infos)
         if placement:
-            self.rows.place(rows, placement)
-        return self._observations(), self._infos(mask)
+            self.simulation.place(mask, placement, infos)
+        return self._observations(), self._told(infos, mask)
 
     def step(
         self, actions: ArrayLike
@@ -112,55 +124,91 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         """Walk one step each; walkers whose episode has ended do as the autoreset mode says."""
         if self._generators is None:
             raise gym.error.ResetNeeded("call reset() before the first step")
-        rows = self.rows
-        chosen = np.asarray(actions, dtype=np.float32)
-        if chosen.shape != rows.actions.shape:
-            raise ValueError(
-                f"actions must have shape ({self.num_envs}, {ACTION_SIZE}), not {chosen.shape}"
-            )
-        restarts = np.flatnonzero(self._ended)
-        if len(restarts) and self.autoreset_mode is AutoresetMode.DISABLED:
+        simulation = self.simulation
+        restarts = np.count_nonzero(self._ended) > 0
+        if restarts and self.autoreset_mode is AutoresetMode.DISABLED:
             raise gym.error.ResetNeeded(
-                f"walkers {restarts.tolist()} have ended; reset them by options={{'reset_mask': ...}}"
+                f"walkers {np.flatnonzero(self._ended).tolist()} have ended; reset them by options={{'reset_mask': ...}}"
             )
-        if not np.isfinite(chosen).all():
+        simulation.actions[:] = self._require_actions(actions)
+        page = self._pages.take() if self.step_info else None
+        infos = None if page is None else page.table
+        simulation.renew_results()
+        share_out(
+            lambda first, last: simulation.step_many(self._ended, first, last, infos),
+            self.num_envs,
+            self.threads,
+        )
+        if restarts:
+            self._begin(self._ended.copy(), infos)
+        rewards, (terminated, truncated) = simulation.rewards, simulation.ends
+        np.logical_or(terminated, truncated, out=self._ended)
+        ends = np.count_nonzero(self._ended) > 0
+        if ends:
+            simulation.note_failures()
+        final: dict[str, Any] = {}
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and ends:
+            final = self._restart_in_same_step(infos)
+        info = {} if page is None else page.info(simulation.falls)
+        return self._observations(), rewards, terminated, truncated, final | info
+
+    def get_state(self) -> State:
+        """Copies of all that the next step depends on, random streams included, as arrays by name; see ``WalkerEnv.get_state``."""
+        if self._generators is None:
+            raise gym.error.ResetNeeded("call reset() before get_state()")
+        return {**state_of(self.simulation, self._generators), "ended": self._ended.copy()}
+
+    def set_state(self, state: State) -> None:
+        """Go on from a state of this environment or of another one with the same walkers, task and options.
+
+        Raises
+        ------
+        ValueError
+            If it is no such state; nothing has changed then.
+        """
+        ended = state.get("ended")
+        if ended is None or ended.shape != (self.num_envs,) or ended.dtype != np.bool_:
+            raise ValueError(f"state must hold 'ended', bool, in shape ({self.num_envs},)")
+        self._generators = restore(self.simulation, state)
+        self._ended[:] = ended
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The arguments, and the state of episodes under way."""
+        state = None if self._generators is None else self.get_state()
+        return {**EzPickle.__getstate__(self), "_state": state}
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        state = kept.pop("_state")
+        EzPickle.__setstate__(self, kept)
+        if state is not None:
+            self.set_state(state)
+
+    def _require_actions(self, actions: ArrayLike) -> NDArray[np.float32]:
+        chosen = np.asarray(actions, dtype=np.float32)
+        if chosen.shape != self.simulation.actions.shape:
+            raise ValueError(
+                f"actions must have shape ({self.num_envs}, {ACTION_SIZE}), got {chosen.shape}"
+            )
+        if np.count_nonzero(np.isfinite(chosen)) < chosen.size:
             bad = ~np.isfinite(chosen).all(axis=1) & ~self._ended
             if bad.any():
                 raise ValueError(
-                    f"actions must be numbers in [-1, 1], not {chosen[bad][0].tolist()}"
+                    f"actions must be numbers in [-1, 1], got {chosen[bad][0].tolist()}"
                 )
-        rows.actions[:] = chosen
-        self._walk()
-        if len(restarts):
-            self._begin(restarts)
-        return self._results()
+        return chosen
 
-    def _results(self) -> tuple[Any, ...]:
-        rows = self.rows
-        rewards, terminated, truncated = rows.results()
-        np.logical_or(terminated, truncated, out=self._ended)
-        final: dict[str, Any] = {}
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
-            final = self._restart_in_same_step()
-        info = self._infos(np.ones(self.num_envs, dtype=np.bool_)) if self.step_info else {}
-        return self._observations(), rewards, terminated, truncated, final | info
-
-    def _restart_in_same_step(self) -> dict[str, Any]:
+    def _restart_in_same_step(self, infos: Vector | None) -> dict[str, Any]:
         """Keep what the ended episodes ended with, then begin new ones."""
         mask = self._ended.copy()
         observations = np.full(self.num_envs, None, dtype=object)
-        ended = np.flatnonzero(mask)
-        for i in ended:
-            observations[i] = self.rows.observations[i].copy()
-        final = {
-            "final_obs": observations,
-            "_final_obs": mask,
-            "final_info": self._infos(mask),
-            "_final_info": mask,
-        }
-        self._begin(ended)
+        for i in np.flatnonzero(mask):
+            observations[i] = self._observation(i)
+        final = {"final_obs": observations, "_final_obs": mask}
+        if self._tells_ends:
+            told = self._told(self.simulation.report(mask), mask)
+            final |= {"final_info": told, "_final_info": mask}
+        self._begin(mask, infos)
         return final
-
     def _reset_mask(self, mask: Any) -> NDArray[np.bool_]:
         if mask is None:
             return np.ones(self.num_envs, dtype=np.bool_)
@@ -170,7 +218,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
             or mask.shape != (self.num_envs,)
         ):
             raise ValueError(
-                f"reset_mask must be a bool array of shape ({self.num_envs},), not {mask!r}"
+                f"reset_mask must be a bool array of shape ({self.num_envs},), got {mask!r}"
             )
         if not mask.any():
             raise ValueError("reset_mask must be true for at least one walker")
@@ -186,7 +234,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
             seeds = list(seed)
             if len(seeds) != self.num_envs:
                 raise ValueError(
-                    f"seed must be one number or {self.num_envs} of them, not {len(seeds)}"
+                    f"seed must be one number or {self.num_envs} of them, got {len(seeds)}"
                 )
         if self._generators is None:
             self._generators = [seeding.np_random(s)[0] for s in seeds]
@@ -195,25 +243,20 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
             if seeds[i] is not None:
                 self._generators[i] = seeding.np_random(seeds[i])[0]
 
-    def _begin(self, rows: NDArray[np.int64]) -> None:
+    def _begin(self, mask: NDArray[np.bool_], infos: Vector | None) -> None:
         assert self._generators is not None
-        self.rows.start(rows, self._generators)
-        self._ended[rows] = False
+        self.simulation.start(mask, self._generators, infos)
+        self._ended[mask] = False
 
     def _observations(self) -> Observations:
-        return self.rows.observations.copy() if self.copy else self.rows.observations
+        observations = self.simulation.observations
+        return observations.copy() if self.copy else observations
 
-    def _infos(self, mask: NDArray[np.bool_]) -> dict[str, Any]:
-        rows = self.rows
-        table = rows.info.fill(rows.memory, rows.outcomes, self.threads)
-        return rows.info.many(table, rows.outcomes[:, c.OUTCOME_STATUS], mask)
+    def _observation(self, row: int) -> Any:
+        return self.simulation.observations[row].copy()
 
-    def _walk(self) -> None:
-        """Step every row, the rows shared out to the threads."""
-        rows = self.rows
-        codes = share_out(
-            lambda first, last: rows.step_many(self._ended, first, last),
-            self.num_envs,
-            self.threads,
-        )
-        rows.raise_for(max(codes))
+    def _told(self, infos: Vector | None, mask: NDArray[np.bool_]) -> dict[str, Any]:
+        if infos is None:
+            return {}
+        falls = np.where(mask, self.simulation.falls, 0)
+        return self.simulation.info.many(infos, falls, mask)

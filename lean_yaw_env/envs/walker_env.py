@@ -10,17 +10,18 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils import EzPickle
 from numpy.typing import ArrayLike, NDArray
 
-from lean_yaw_env.envs import columns as c
+from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, action_space
 from lean_yaw_env.envs.pictures import Footage
-from lean_yaw_env.envs.rows import WalkerRows
-from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.envs.simulation import Simulation
+from lean_yaw_env.envs.snapshots import State, restore, state_of
+from lean_yaw_env.envs.tasks import Task, task_named
 from lean_yaw_env.rendering.pygame_renderer import Renderer
-from lean_yaw_env.walker import FALL_OF_STATUS
+from lean_yaw_env.validation import require_choice
 
 RENDER_FPS = 4
 """Walking steps per second of a video: near a walker of a metre's leg at Table 1's gait."""
-_ROW = np.array([0])
+_ONE = np.ones(1, dtype=np.bool_)
 
 
 class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
@@ -49,12 +50,13 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
     | last | the task's features | | |
 
     ## Ends
-    A fall is ``terminated``, the horizon of simulated time is ``truncated``.
+    A fall is ``terminated``, the horizon of simulated time is ``truncated``. A step that the integrator gives up is ``terminated`` too, without
+    reward: ``info["fall"]`` is then ``FallCode.SOLVER``, and the walker stands where the step began.
 
     Parameters
     ----------
-    task : str
-        A name in ``lean_yaw_env.registration.TASK_VERSIONS``.
+    task : str or Task
+        A task's name, its environment id, or a task of your own.
     render_mode : None, "rgb_array" or "human"
         Pictures need pygame, windows a display.
     **options
@@ -62,12 +64,12 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
 
     Raises
     ------
+    TypeError
+        If there is no such option.
     ValueError
         If an option, an action or a reset option is bad; an environment is then unchanged.
     NoGaitError
         If the walker has no gait to start from.
-    SolverError
-        If the integrator gives up; never for a fall.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -76,19 +78,19 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
     }
 
     def __init__(
-        self, task: str = "Heading", render_mode: str | None = None, **options: Any
+        self, task: str | Task = "Heading", render_mode: str | None = None, **options: Any
     ) -> None:
         EzPickle.__init__(self, task, render_mode, **options)
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(
-                f"render_mode must be None, 'rgb_array' or 'human', not {render_mode!r}"
-            )
+        if render_mode is not None:
+            require_choice("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
-        self.options = EnvOptions(**options)
+        self.options = EnvOptions.of(options)
         self.task = task_named(task)
-        self.rows = WalkerRows(self.task, self.options, 1)
+        self.simulation = Simulation(self.task, self.options, 1)
         self.observation_space = self.options.observation_space(self.task)
         self.action_space = action_space()
+        self._infos = self.simulation.new_infos()
+        self._views = self.simulation.info.views(self._infos[0])
         self._running = False
         self._renderer = None if render_mode is None else Renderer()
         self._footage: Footage | None = None
@@ -101,16 +103,15 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         ``options`` may hold ``state`` (a section state), ``stance`` ("left" or "right") and the commands that the task takes
         (``Task.commands``), in place of what would be drawn.
         """
-        self.rows.check_options(options or {})
+        simulation = self.simulation
+        simulation.check_options(options or {})
         super().reset(seed=seed)
-        self.rows.start(_ROW, [self.np_random])
+        simulation.start(_ONE, [self.np_random], self._infos)
         if options:
-            self.rows.place(_ROW, options)
+            simulation.place(_ONE, options, self._infos)
         self._running = True
-        if self._renderer is not None:
-            self._footage = Footage(self.rows)
-            self._show()
-        return self.rows.observations[0].copy(), self._info()
+        self._begin_footage()
+        return simulation.observations[0].copy(), self._info()
 
     def step(
         self, action: ArrayLike
@@ -118,25 +119,60 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         """Walk one step."""
         if not self._running:
             raise ResetNeeded("call reset() before the first step and after the end of an episode")
-        rows = self.rows
+        simulation = self.simulation
         chosen = np.asarray(action, dtype=np.float32)
         if chosen.shape != (ACTION_SIZE,):
-            raise ValueError(f"action must have shape ({ACTION_SIZE},), not {chosen.shape}")
-        rows.actions[0] = chosen
-        rows.step_one()
-        terminated = bool(rows.terminated[0])
-        truncated = bool(rows.truncated[0])
+            raise ValueError(f"action must have shape ({ACTION_SIZE},), got {chosen.shape}")
+        simulation.actions[0] = chosen
+        if not simulation.step_one(self._infos):
+            raise ValueError(f"action must be numbers in [-1, 1], got {chosen.tolist()}")
+        (terminated,), (truncated,) = simulation.ends.tolist()
+        if terminated:
+            simulation.note_failures()
         self._running = not (terminated or truncated)
         if self._footage is not None:
             self._footage.extend()
             self._show()
         return (
-            rows.observations[0].copy(),
-            float(rows.rewards[0]),
+            simulation.observations[0].copy(),
+            simulation.rewards.item(),
             terminated,
             truncated,
             self._info(),
         )
+
+    def get_state(self) -> State:
+        """Copies of all that the next step depends on, random stream included, as arrays by name.
+
+        With ``set_state`` an environment plans: keep a state, try actions, go back. ``walkers`` and ``tasks`` are records with named fields
+        (``envs.state.WALKER_FIELDS``, ``Task.fields``).
+        """
+        if not self._running:
+            raise ResetNeeded("call reset() before get_state(): the episode is over or has not begun")
+        return state_of(self.simulation, [self.np_random])
+
+    def set_state(self, state: State) -> None:
+        """Go on from a state of this environment or of another one with the same task and options.
+
+        Raises
+        ------
+        ValueError
+            If it is no such state; nothing has changed then.
+        """
+        (self.np_random,) = restore(self.simulation, state)
+        self._running = True
+        self._begin_footage()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The arguments, and the state of an episode under way."""
+        state = self.get_state() if self._running else None
+        return {**EzPickle.__getstate__(self), "_state": state}
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        state = kept.pop("_state")
+        EzPickle.__setstate__(self, kept)
+        if state is not None:
+            self.set_state(state)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """The picture just after the last heel strike, for "rgb_array"; shape (height, width, 3)."""
@@ -154,15 +190,17 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         if self._renderer is not None:
             self._renderer.close()
 
+    def _info(self) -> dict[str, Any]:
+        return self.simulation.info.one(self._views, self.simulation.falls[0])
+
+    def _begin_footage(self) -> None:
+        if self._renderer is not None:
+            self._footage = Footage(self.simulation)
+            self._show()
+
     def _show(self) -> None:
         if self.render_mode == "human" and self._renderer and self._footage:
             self._renderer.show(self._footage.scene(self._fall()), RENDER_FPS)
 
     def _fall(self) -> str | None:
-        fall = FALL_OF_STATUS.get(float(self.rows.outcomes[0, c.OUTCOME_STATUS]))
-        return None if fall is None else fall.value
-
-    def _info(self) -> dict[str, Any]:
-        rows = self.rows
-        table = rows.info.fill(rows.memory, rows.outcomes)
-        return rows.info.one(table, rows.outcomes[0, c.OUTCOME_STATUS])
+        return FallCode(self.simulation.falls[0]).word

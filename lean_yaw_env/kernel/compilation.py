@@ -12,12 +12,12 @@ import hashlib
 import linecache
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
-from numba import config, njit
+from numba import config, njit, typeof
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
@@ -37,6 +37,35 @@ inlined = _njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True
 def fused(function: Any) -> Any:
     """Mark a formula of floats as ``inlined`` does, with products and sums fused; see ``fusing``."""
     return function if _config.DISABLE_JIT else inlined(fusing.fuse(function))
+
+
+def formula(function: Any) -> Any:
+    """Mark a formula that compiled code inlines, as ``inlined`` does, and that Python calls as the plain function it is.
+
+    Its numbers may then be floats, complex numbers or NumPy's arrays, and its records ``numpy.recarray``.
+    """
+    by_type(function, strict=False)(lambda *arguments: function)
+    return function
+
+
+def written_formula(name: str, arguments: Sequence[str], lines: Sequence[str]) -> Any:
+    """A formula made of lines of source, for what would repeat the same line for each field of a record."""
+    body = "\n".join(f"    {line}" for line in lines)
+    return formula(generated(f"def {name}({', '.join(arguments)}):\n{body}\n"))
+
+
+def generated(source: str, **names: Any) -> FunctionType:
+    """The one function that a source text defines, for the decorators above; ``names`` are what the text refers to.
+
+    The text is kept where a traceback and ``fusing`` look for it.
+    """
+    place = f"<generated {hashlib.sha256(source.encode()).hexdigest()[:12]}>"
+    linecache.cache[place] = (len(source), None, source.splitlines(keepends=True), place)
+    scope: dict[str, Any] = {"__name__": __name__, **names}
+    before = {"__builtins__", *scope}
+    exec(compile(source, place, "exec"), scope)
+    (function,) = (scope[name] for name in scope if name not in before)
+    return function
 
 
 def borrowed(array: Any) -> Any:
@@ -62,9 +91,9 @@ def _without_owner_code(typing_context, array):
 _without_owner: Any = intrinsic(_without_owner_code)
 
 
-def by_type(function: Callable[..., Any]) -> Callable[..., Any]:
+def by_type(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
     """Decorate what chooses, by the arguments' types, the formula that is compiled in a function's place."""
-    return _overload(function, jit_options={"forceinline": True, **_OPTIONS})
+    return _overload(function, jit_options={"forceinline": True, **_OPTIONS}, **options)
 
 
 @by_type(borrowed)
@@ -75,46 +104,30 @@ def _borrowed(array):
 _PACKAGE = __name__.split(".", 1)[0]
 
 
-def generated(source: str, **names: Any) -> FunctionType:
-    """The one function that a source text defines, for the decorators above; ``names`` are what the text refers to.
-
-    The text is kept where a traceback, ``fusing`` and the digest of an entry point look for it.
-    """
-    place = f"<generated {hashlib.sha256(source.encode()).hexdigest()[:12]}>"
-    linecache.cache[place] = (len(source), None, source.splitlines(keepends=True), place)
-    scope: dict[str, Any] = {"__name__": __name__, **names}
-    exec(compile(source, place, "exec"), scope)
-    (function,) = (
-        value for name, value in scope.items() if name not in ("__builtins__", "__name__", *names)
-    )
-    return function
-
-
-def _text(path: str) -> bytes:
-    """The source of a file, or of a generated function in its place."""
-    return (
-        "".join(linecache.getlines(path)).encode()
-        if path.startswith("<")
-        else Path(path).read_bytes()
-    )
-
-
-def _ingredients(function: Callable[..., Any]) -> tuple[set[str], set[str]]:
-    """What a function is compiled from: files (its own, and those of the package's formulas and records that it names) and constants."""
+def _ingredients(
+    function: Callable[..., Any], formulas: Iterable[Callable[..., Any]]
+) -> tuple[set[str], set[str]]:
+    """What a function is compiled from: files (its own, and those of the formulas and records that it names, of this package and of the
+    packages of ``formulas``) and constants. A function without a file, as one typed at a prompt, counts by its code."""
     files: set[str] = {__file__, str(fusing.__file__)}
     constants: set[str] = set()
+    packages = {_PACKAGE, *(each.__module__.split(".", 1)[0] for each in formulas)}
     waiting: list[Any] = [function]
     seen: set[Any] = set()
     while waiting:
         each = waiting.pop()
         seen.add(each)
-        files.add(each.__code__.co_filename)
+        code = each.__code__
+        if Path(code.co_filename).is_file():
+            files.add(code.co_filename)
+        else:
+            constants.add(f"{code.co_name} = {code.co_code!r} {code.co_consts!r} {code.co_names!r}")
         for name, named in _names(each):
             named = getattr(named, "py_func", named)
             home = named.__name__ if isinstance(named, ModuleType) else _home(named)
             if isinstance(named, (bool, int, float, tuple)):
                 constants.add(f"{name} = {named!r}")
-            elif home.split(".", 1)[0] != _PACKAGE:
+            elif home.split(".", 1)[0] not in packages:
                 continue
             elif isinstance(named, FunctionType):
                 waiting.extend({named} - seen)
@@ -124,7 +137,7 @@ def _ingredients(function: Callable[..., Any]) -> tuple[set[str], set[str]]:
 
 
 def _names(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
-    """What a function's names stand for, those of the module and those of the functions around it."""
+    """What a function's names stand for, those of its module and those of the functions around it."""
     code = function.__code__
     yield from ((name, function.__globals__.get(name)) for name in code.co_names)
     for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
@@ -136,16 +149,18 @@ def _home(named: Any) -> str:
     return getattr(named, "__module__", None) or ""
 
 
-def _digest(function: Callable[..., Any]) -> str:
+def _digest(function: Callable[..., Any], formulas: Iterable[Callable[..., Any]]) -> str:
     """A digest of what a function's machine code depends on."""
-    files, constants = _ingredients(function)
+    files, constants = _ingredients(function, formulas)
     digest = hashlib.sha256("\n".join(sorted(constants)).encode())
     for path in sorted(files):
-        digest.update(_text(path))
+        digest.update(Path(path).read_bytes())
     return digest.hexdigest()
 
 
-def entry_point(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+def entry_point(
+    formulas: Iterable[Callable[..., Any]] = (), **options: Any
+) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function that Python calls, releasing the GIL, and keep its machine code on disk.
 
     Numba renews its cache when the entry point's own file changes, but not when a formula inlined from another file does. A digest
@@ -162,10 +177,47 @@ def entry_point(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         except RuntimeError:
             _warn_uncached()
         else:
-            dispatcher._cache._cache_file._source_stamp = _digest(function)
+            dispatcher._cache._cache_file._source_stamp = _digest(function, formulas)
         return dispatcher
 
     return decorate
+
+
+def entry_point_with(
+    template: Callable[..., Any],
+    name: str,
+    formulas: Mapping[str, Callable[..., Any]],
+    parts: Sequence[str] = (),
+    **constants: Any,
+) -> Any:
+    """Compile a template as an entry point of its own, with formulas and constants in the place of its globals of the same names.
+
+    ``parts`` names the functions of the template's module that it calls and whose globals are replaced alike. The machine code is
+    kept under the template's name and ``name``.
+    """
+    names = {**template.__globals__, **formulas, **constants}
+    names |= {part: formula(_rebound(names[part], names, part)) for part in parts}
+    function = _rebound(template, names, f"{template.__name__}_{name}")
+    return entry_point(tuple(formulas.values()))(function)
+
+
+def for_types_of(entry: Any, *arguments: Any) -> Callable[..., Any]:
+    """An entry point compiled for arguments of these types, without the search for them at each call, which takes longer than a small step.
+
+    What it is called with must have the same types, dimensions and memory layouts: nobody checks.
+    """
+    if not hasattr(entry, "overloads"):  # NUMBA_DISABLE_JIT=1 leaves a plain function
+        return entry
+    signature = tuple(typeof(argument) for argument in arguments)
+    entry.compile(signature)
+    return entry.overloads[signature].entry_point
+
+
+def _rebound(function: Any, names: dict[str, Any], name: str) -> Any:
+    """The same code with other globals."""
+    again = FunctionType(function.__code__, names, name)
+    again.__qualname__ = name
+    return again
 
 
 _warned: set[str] = set()

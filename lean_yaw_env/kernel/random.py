@@ -19,11 +19,11 @@ _UNIT = 2.0**-53
 
 
 @inlined
-def uniform(stream, i, low, high):
-    """The next number of walker ``i`` in [low, high); ``stream`` (n, 2) holds keys and counters as uint64."""
-    counter = stream[i, 1] + _ONE
-    stream[i, 1] = counter
-    z = stream[i, 0] + counter * _GAMMA
+def uniform(stream, low, high):
+    """The next number in [low, high); ``stream`` is a record with the fields ``key`` and ``counter``, both uint64."""
+    counter = stream.counter + _ONE
+    stream.counter = counter
+    z = stream.key + counter * _GAMMA
     z = (z ^ (z >> _S30)) * _MIX_1
     z = (z ^ (z >> _S27)) * _MIX_2
     z = z ^ (z >> _S31)
@@ -31,12 +31,12 @@ def uniform(stream, i, low, high):
 
 
 @inlined
-def normal(stream, i):
-    """The next number of walker ``i`` around 0 with standard deviation 1, never beyond 6: the sum of twelve uniform ones, less 6.
+def normal(stream):
+    """The next number around 0 with standard deviation 1, never beyond 6: the sum of twelve uniform ones, less 6.
 
     Additions alone give it the same bits on every machine, which a logarithm or a sine does not.
     """
     total = -6.0
     for _ in range(12):
-        total += uniform(stream, i, 0.0, 1.0)
+        total += uniform(stream, 0.0, 1.0)
     return total

@@ -21,6 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lean_yaw_env.extras import needs_extra
+
 Vector = NDArray[np.float64]
 
 ROLE_COORDINATES = (
@@ -106,7 +108,8 @@ def rotation_ankle(angle: float, tilt: float) -> Vector:
 @cache
 def _compiled() -> Callable[..., Any]:
     """Derive and compile the model; about two seconds, once per process."""
-    import sympy as sp  # heavy and only needed by this second opinion
+    with needs_extra("analysis"):
+        import sympy as sp  # heavy and only needed by this second opinion
 
     coordinates = sp.symbols("x y z u1 u2 p_stance p_swing ankle mu")
     rates = sp.symbols("v0:9")

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from lean_yaw_env.analysis import continue_gait
-from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import compare, judge
 from lean_yaw_env.paper.drawing import new_figure, picture_of
 from lean_yaw_env.paper.multiplier_curves import (
@@ -16,11 +15,12 @@ from lean_yaw_env.paper.multiplier_curves import (
     along_tilt,
     draw_curves,
 )
+from lean_yaw_env.paper.numbers import PASSIVE_SLOPE, number, statement
 from lean_yaw_env.paper.results import Result
 from lean_yaw_env.paper.walkers import FlatGait, flat_active_walker, flat_passive_walker
 
 TILT = "ankle joint orientation α (rad)"
-_SLOPES_10 = (numbers.PASSIVE_SLOPE, 0.01)
+_SLOPES_10 = (PASSIVE_SLOPE, 0.01)
 _TILTS_10 = ((0.13, 0.17), (0.02, 0.8))
 _TOP = 1.5
 _SLOPES_11 = (0.0005, 0.02)
@@ -51,26 +51,26 @@ def figure_10() -> Result:
     left, right = active_multipliers()
     flat = FlatGait.of(flat_active_walker())
     low, high = flat.stable_tilts(*_TILTS_10[1])
-    active = FlatGait.of(flat_active_walker(numbers.PASSIVE_SLOPE)).stable_tilts(*_TILTS_10[0])
+    active = FlatGait.of(flat_active_walker(PASSIVE_SLOPE)).stable_tilts(*_TILTS_10[0])
     passive = FlatGait.of(flat_passive_walker()).stable_tilts(*_TILTS_10[0])
     is_close = all(abs(a - b) < _CLOSE for a, b in zip(active, passive, strict=True))
     zero = float(flat.multipliers(0.3)[0][-1])
     return Result(
         checks=(
-            compare(numbers.STABLE_TILT_LOW, low),
-            compare(numbers.STABLE_TILT_HIGH, high),
+            compare(number("least stable tilt"), low),
+            compare(number("greatest stable tilt"), high),
             judge(
-                numbers.SAME_AS_PASSIVE,
+                statement("active beside passive"),
                 is_close,
                 ours=f"active {active[0]:.4f} to {active[1]:.4f}, "
                 f"passive {passive[0]:.4f} to {passive[1]:.4f}",
-                remark="" if is_close else f"An end moves by more than {_CLOSE:g} rad.",
+                unless=f"An end moves by more than {_CLOSE:g} rad.",
             ),
             judge(
-                numbers.SWING_ZERO,
+                statement("held swing leg"),
                 zero < 1e-9,
                 ours=f"{zero:.0e}; the swing rate has left the section's state altogether",
-                remark="" if zero < 1e-9 else "It is not zero.",
+                unless="It is not zero.",
             ),
         ),
         tables={"figure10_left": left.columns(), "figure10_right": right.columns()},
@@ -110,7 +110,7 @@ def figure_11() -> Result:
     """Figure 11 with its check."""
     curves = slope_multipliers()
     return Result(
-        checks=(compare(numbers.STABLE_SLOPE, stable_slope()),),
+        checks=(compare(number("least stable slope"), stable_slope()),),
         tables={"figure11": curves.columns()},
         picture=picture_of(draw_slope_multipliers(curves)),
         caption=(

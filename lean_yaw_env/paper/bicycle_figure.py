@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import Check, compare, judge
 from lean_yaw_env.paper.drawing import FAINT, STABLE_FACE, name_axes, new_figure, picture_of
+from lean_yaw_env.paper.numbers import number, statement
 from lean_yaw_env.paper.results import Columns, Result
 from lean_yaw_env.vehicles import (
     EigenvalueBranches,
@@ -115,31 +115,29 @@ def bicycle_checks(data: BicycleEigenvalues) -> tuple[Check, ...]:
     capsize = [_real_nearest_zero(bicycle, speed) for speed in _VERY_FAST]
     vanishes = capsize[0] > 2.0 * capsize[1] > 4.0 * capsize[2] > 0.0
     return (
-        compare(numbers.BICYCLE_DOUBLE_ROOT, data.double_root_speed),
-        compare(numbers.BICYCLE_WEAVE, data.weave_speed),
-        compare(numbers.BICYCLE_CAPSIZE, data.capsize_speed),
+        compare(number("double root"), data.double_root_speed),
+        compare(number("weave speed"), data.weave_speed),
+        compare(number("capsize speed"), data.capsize_speed),
         judge(
-            numbers.BICYCLE_LOW_SPEED,
+            statement("low speed"),
             is_pendulum,
             ours="two and two, all real" if is_pendulum else "not at every speed below",
-            remark="" if is_pendulum else "Some speed below has another pattern.",
+            unless="Some speed below has another pattern.",
         ),
         judge(
-            numbers.BICYCLE_FREQUENCY,
+            statement("weave frequency"),
             is_proportional,
             ours="frequency over speed at 5, 10, 20, 40 m/s: "
             + ", ".join(f"{value:.3f}" for value in per_speed)
             + " rad/m",
-            remark=""
-            if is_proportional
-            else "Between 5 and 10 m/s the frequency grows faster than the speed; proportional it "
+            unless="Between 5 and 10 m/s the frequency grows faster than the speed; proportional it "
             "becomes beyond 20 m/s, off the paper's figure.",
         ),
         judge(
-            numbers.BICYCLE_HIGH_SPEED,
+            statement("high speed"),
             vanishes,
             ours="at 10, 100, 1000 m/s: " + ", ".join(f"{v:.2g}" for v in capsize) + " 1/s",
-            remark="" if vanishes else "It does not.",
+            unless="It does not.",
         ),
     )
 

@@ -105,7 +105,7 @@ def compare(
 
 
 def judge(
-    statement: Statement, holds: bool, *, ours: str, remark: str = "", is_open: bool = False
+    statement: Statement, holds: bool, *, ours: str, remark: str = "", unless: str = ""
 ) -> Check:
     """Judge a statement that is not one number.
 
@@ -116,9 +116,9 @@ def judge(
     ours : str
         What we find, with its numbers.
     remark : str
-        Needed where it does not hold.
-    is_open : bool
-        Whether a disagreement is unexplained.
+        Said in any case.
+    unless : str
+        Said if it does not hold; one of the two is needed then.
     """
     return Check(
         name=statement.name,
@@ -127,8 +127,18 @@ def judge(
         paper=statement.printed,
         ours=ours,
         difference=None,
-        verdict="agrees" if holds else "open" if is_open else "differs",
-        remark=remark,
+        verdict="agrees" if holds else "differs",
+        remark=" ".join(filter(None, [remark, "" if holds else unless])),
+    )
+
+
+def judge_inside(number: PaperNumber, low: float, high: float) -> Check:
+    """Judge whether a value that the paper says is stable lies in the stable range found."""
+    return judge(
+        Statement(number.name, f"around {number.printed}", number.where, number.meaning),
+        low < number.value < high,
+        ours=f"stable from {low:.5f} to {high:.5f}",
+        unless=f"{number.printed} itself is outside.",
     )
 
 

@@ -9,8 +9,8 @@ from scipy.optimize import brentq, minimize_scalar
 
 from lean_yaw_env.analysis import continue_gait, find_limit_cycle, largest_disturbance, modes
 from lean_yaw_env.errors import NoGaitError
-from lean_yaw_env.paper import numbers
-from lean_yaw_env.paper.checks import Check, compare, judge
+from lean_yaw_env.paper.checks import Check, compare, judge, judge_inside
+from lean_yaw_env.paper.numbers import number, statement
 from lean_yaw_env.paper.results import Result
 from lean_yaw_env.paper.walkers import (
     FlatGait,
@@ -87,13 +87,13 @@ def _slope_checks() -> list[Check]:
     doubling = doubling_slope(arc_foot_walker(), (0.0003, 0.08))
     return [
         compare(
-            numbers.SLOPE_LIMIT_A,
+            number("slope limit, A"),
             doubling_slope(point_foot_walker(), (0.001, 0.03)),
             remark="Where the gait's period doubles; gaits of longer periods are stable a little "
             "further, to 0.019.",
         ),
         compare(
-            numbers.MAXIMAL_SLOPE,
+            number("maximal slope, C"),
             doubling,
             unless="Fore-aft the gait is stable to where its period doubles, 1.3 % short of the "
             "paper's slope; feet of finite mass end it earlier still (0.0450 at a mass of 0.003 "
@@ -105,14 +105,11 @@ def _slope_checks() -> list[Check]:
 
 def _basin_checks() -> list[Check]:
     checks = []
-    for number, walker in (
-        (numbers.BASIN_A, point_foot_walker()),
-        (numbers.BASIN_B, arc_foot_walker()),
-    ):
+    for name, walker in (("basin, A", point_foot_walker()), ("basin, B", arc_foot_walker())):
         share, what = least_deviation(walker)
         checks.append(
             compare(
-                number,
+                number(name),
                 100.0 * share,
                 remark=f"The least over both signs and all initial conditions, one at a time ({what}).",
             )
@@ -129,20 +126,13 @@ def _steeper_checks() -> list[Check]:
         )
     except NoGaitError:
         low = high = float("nan")
-    tilt = numbers.TILT_AT_0004
-    holds = low < tilt.value < high
     return [
         compare(
-            numbers.PITCH_AT_0004,
+            number("stance leg angle at γ = 0.004"),
             pitch,
             remark=f"The stance leg's angle, not the step length, which is {gait.step_length:.3f}.",
         ),
-        judge(
-            numbers.Statement(tilt.name, f"around {tilt.printed}", tilt.where, tilt.meaning),
-            holds,
-            ours=f"stable from {low:.4f} to {high:.4f}",
-            remark="" if holds else f"{tilt.printed} itself is outside.",
-        ),
+        judge_inside(number("stable tilt at γ = 0.004"), low, high),
     ]
 
 
@@ -152,7 +142,7 @@ def _mode_check() -> Check:
     fore_aft = kinds.count("fore-aft")
     pure = all(min(share, 1.0 - share) < 1e-9 for share in shares)
     return judge(
-        numbers.MODES_C,
+        statement("modes, C"),
         fore_aft == 3,
         ours=f"{fore_aft} fore-aft, {len(kinds) - fore_aft} three-dimensional"
         + (", each purely so" if pure else ""),

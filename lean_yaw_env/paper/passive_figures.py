@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from lean_yaw_env.paper import numbers
-from lean_yaw_env.paper.checks import Check, compare, judge
+from lean_yaw_env.paper.checks import Check, compare, judge, judge_inside
 from lean_yaw_env.paper.drawing import FAINT, name_axes, new_figure, picture_of
 from lean_yaw_env.paper.multiplier_curves import MultiplierCurves, along_tilt, draw_curves
+from lean_yaw_env.paper.numbers import PASSIVE_SLOPE, POINT_FOOT_SLOPE, number, statement
 from lean_yaw_env.paper.results import Result
 from lean_yaw_env.paper.walkers import (
     FlatGait,
@@ -96,20 +96,20 @@ def figure_7() -> Result:
 
 
 def _gait_checks(points: tuple[float, float], arcs: tuple[float, float]) -> tuple[Check, ...]:
-    efficiency = numbers.POINT_FOOT_SLOPE / numbers.PASSIVE_SLOPE
+    efficiency = POINT_FOOT_SLOPE / PASSIVE_SLOPE
     apart = abs(arcs[1] / points[1] - 1.0)
     holds = apart < _SAME_SPEED
     return (
-        compare(numbers.POINT_FOOT_PITCH, points[0]),
-        compare(numbers.ARC_FOOT_PITCH, arcs[0]),
+        compare(number("stance leg angle, A"), points[0]),
+        compare(number("stance leg angle, B"), arcs[0]),
         judge(
-            numbers.SAME_VELOCITY,
+            statement("velocity of A and B"),
             holds,
             ours=f"A {points[1]:.4f}, B {arcs[1]:.4f}, {apart:.1%} apart",
-            remark="" if holds else f"They are more than {_SAME_SPEED:.0%} apart.",
+            unless=f"They are more than {_SAME_SPEED:.0%} apart.",
         ),
         compare(
-            numbers.EFFICIENCY,
+            number("efficiency"),
             efficiency,
             remark="Cost of transport is the slope, so this is the ratio of the paper's slopes.",
         ),
@@ -135,7 +135,7 @@ def figure_8() -> Result:
     curves = passive_multipliers()
     low, high = FlatGait.of(flat_passive_walker()).stable_tilts(*_TILTS_8)
     return Result(
-        checks=(_inside(numbers.STABLE_TILT_PASSIVE, low, high),),
+        checks=(judge_inside(number("stable tilt, passive"), low, high),),
         tables={"figure8": curves.columns()},
         picture=picture_of(draw_passive_multipliers(curves)),
         caption=(
@@ -143,15 +143,4 @@ def figure_8() -> Result:
             "solid, fore-aft modes dashed, the stable region shaded. The ranges of the axes are "
             "ours; the paper's text does not give them."
         ),
-    )
-
-
-def _inside(number: numbers.PaperNumber, low: float, high: float) -> Check:
-    """Whether a tilt that the paper says is stable is so; its own value is compared too."""
-    holds = low < number.value < high
-    return judge(
-        numbers.Statement(number.name, f"around {number.printed}", number.where, number.meaning),
-        holds,
-        ours=f"stable from {low:.5f} to {high:.5f}",
-        remark="" if holds else f"{number.printed} itself is outside.",
     )

@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from lean_yaw_env.analysis import LimitCycle, find_limit_cycle
-from lean_yaw_env.paper import numbers
+from lean_yaw_env.paper.numbers import LARGE_OFFSET, SMALL_OFFSET
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.walker import Walk, Walker
 
 
-def settled_heading(mass_offset: float = numbers.SMALL_OFFSET) -> float:
+def settled_heading(mass_offset: float = SMALL_OFFSET) -> float:
     """Heading, rad to the right, of the gait across the slope, the mean of both feet."""
     walker = Walker()
     gait = find_limit_cycle(walker, mass_offset=mass_offset)
@@ -20,7 +20,7 @@ def settled_heading(mass_offset: float = numbers.SMALL_OFFSET) -> float:
     return -0.5 * float(gait.state[0] + step.state[0])
 
 
-def asymptotic_heading(mass_offset: float = numbers.SMALL_OFFSET) -> float:
+def asymptotic_heading(mass_offset: float = SMALL_OFFSET) -> float:
     """The same in closed form, sin(heading) = offset / tan(slope), rad to the right.
 
     Where the line from foot to centre of mass, moved aside, is plumb across the course.
@@ -33,14 +33,6 @@ def turned(walk: Walk) -> float:
     return math.degrees(float(np.abs(walk.headings - walk.headings[0]).max()))
 
 
-def turning_radius(walk: Walk) -> float:
-    """Length walked per angle turned over the first right angle of a turn, leg lengths."""
-    strides = np.linalg.norm(walk.footprints[2::2] - walk.footprints[:-2:2], axis=1)
-    angles = np.abs(walk.headings[2::2] - walk.headings[0])
-    quarter = int(np.searchsorted(angles, 0.5 * math.pi))
-    return float(strides[: quarter + 1].sum() / angles[min(quarter, angles.size - 1)])
-
-
 def circling_walker() -> Walker:
     """Table 1's walker on a slope that turns with it."""
     return Walker(WalkerParameters(slope_turns=True))
@@ -48,9 +40,4 @@ def circling_walker() -> Walker:
 
 def circling_gait() -> LimitCycle:
     """Its gait with the large offset, which turns by as much every stride."""
-    return find_limit_cycle(circling_walker(), mass_offset=numbers.LARGE_OFFSET)
-
-
-def circling_radius(gait: LimitCycle) -> float:
-    """Radius of the circle on which one foot's prints lie: a chord for each stride."""
-    return gait.step_length / abs(math.sin(0.5 * gait.turn))
+    return find_limit_cycle(circling_walker(), mass_offset=LARGE_OFFSET)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lean_yaw_env.analysis import continue_gait, stability_map
-from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import compare, judge
 from lean_yaw_env.paper.drawing import MULTIPLIER, STABLE_FACE, name_axes, new_figure, picture_of
+from lean_yaw_env.paper.numbers import number, statement
 from lean_yaw_env.paper.results import Columns, Result
 from lean_yaw_env.paper.walkers import flat_active_walker, table_1_gait
 from lean_yaw_env.paper.wide_hips import (
@@ -91,8 +91,8 @@ def draw_passive_surface(data: MultiplierSurface, rows: tuple[WideHipRow, ...]) 
     plane.fill_betweenx(widths, ends[:, 0], ends[:, 1], color=STABLE_FACE, edgecolor="k")
     plane.set_xlim(*_PASSIVE_TILTS)
     plane.set_ylim(0.0, widths[-1])
-    plane.axhline(numbers.WIDEST_STABLE_HIP.value, color="k", linewidth=0.8, linestyle=":")
-    plane.annotate("the paper's limit", (0.165, numbers.WIDEST_STABLE_HIP.value + 0.001))
+    plane.axhline(number("hip width limit, D").value, color="k", linewidth=0.8, linestyle=":")
+    plane.annotate("the paper's limit", (0.165, number("hip width limit, D").value + 0.001))
     name_axes(plane, _TILT, _WIDTH, title="stable region")
     return figure
 
@@ -155,14 +155,14 @@ def figure_9() -> Result:
     return Result(
         checks=(
             compare(
-                numbers.WIDEST_STABLE_HIP,
+                number("hip width limit, D"),
                 width,
                 unless=f"Stable gaits go on to d = {width:.4f}, at α = {tilt:.4f}, in intervals "
                 "of α no wider than 0.0015; the paper's sketch is drawn from a number of "
                 "cross-sections, which can miss them.",
             ),
             judge(
-                numbers.NO_STABLE_HIP,
+                statement("no stable gait, D"),
                 grows,
                 ours=f"least greatest |λ| at d = {', '.join(f'{row.hip_width:.2f}' for row in wide)}: "
                 f"{', '.join(f'{value:.2f}' for value in least)}",
@@ -202,13 +202,13 @@ def figure_12() -> Result:
     return Result(
         checks=(
             judge(
-                numbers.TABLE_1_STABLE,
+                statement("asterisk"),
                 gait.is_stable,
                 ours=f"greatest |λ| = {abs(gait.eigenvalues[0]):.4f}",
-                remark="" if gait.is_stable else "It is unstable.",
+                unless="It is unstable.",
             ),
             judge(
-                numbers.WIDER_HELPS,
+                statement("wider hips"),
                 helps,
                 ours="stable α: "
                 + "; ".join(texts)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from lean_yaw_env.analysis import find_limit_cycle, stability_map
-from lean_yaw_env.paper import numbers
 from lean_yaw_env.paper.checks import Check, compare, judge
 from lean_yaw_env.paper.drawing import DARK_GREY, LIGHT_GREY, name_axes, new_figure, picture_of
+from lean_yaw_env.paper.numbers import CRITICAL_TILTS, numbers_of, statement
 from lean_yaw_env.paper.results import Columns, Result
 from lean_yaw_env.paper.walkers import flat_active_walker
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector
@@ -59,7 +59,7 @@ class VelocityMap:
 def velocity_map(slopes: int = 100, radii: int = 91) -> VelocityMap:
     """Figure 13's data."""
     axes = {
-        "ankle_tilt": np.array(numbers.CRITICAL_TILTS),
+        "ankle_tilt": np.array(CRITICAL_TILTS),
         # Closer where it is gentle, for there the speed changes fast
         "slope": np.linspace(_SLOPES[0] ** 0.5, _SLOPES[1] ** 0.5, slopes) ** 2,
         "foot_radius": np.linspace(*_RADII, radii),
@@ -121,17 +121,13 @@ def boundary_checks() -> tuple[Check, ...]:
     """Critical speeds at foot radius 0.5, and how little they depend on the radius."""
     checks = []
     spreads = []
-    for number, tilt in zip(
-        (numbers.CRITICAL_SPEED_PI_8, numbers.CRITICAL_SPEED_PI_4),
-        numbers.CRITICAL_TILTS,
-        strict=True,
-    ):
+    for printed, tilt in zip(numbers_of("critical speed"), CRITICAL_TILTS, strict=True):
         speeds = np.array([flat_critical_speed(tilt, radius) for radius in _BOUNDARY_RADII])
         spreads.append(speeds)
         text = ", ".join(f"{v:.3f}" for v in speeds)
         checks.append(
             compare(
-                number,
+                printed,
                 flat_critical_speed(tilt),
                 remark=f"At r = 0.5; at r = 0.1, 0.2, 0.4, 0.6, 0.8: {text}.",
             )
@@ -140,12 +136,12 @@ def boundary_checks() -> tuple[Check, ...]:
     holds = widest < _ALMOST
     checks.append(
         judge(
-            numbers.ONE_SPEED,
+            statement("boundary is a velocity contour"),
             holds,
             ours="; ".join(
                 f"{v.min():.3f} to {v.max():.3f} ({np.ptp(v) / v.mean():.1%})" for v in spreads
             ),
-            remark="" if holds else f"The spread is more than {_ALMOST:.0%}.",
+            unless=f"The spread is more than {_ALMOST:.0%}.",
         )
     )
     return tuple(checks)
@@ -163,13 +159,13 @@ def tilt_checks() -> tuple[Check, ...]:
     slight = over and usual < _SLIGHT
     return (
         judge(
-            numbers.TILT_INDEPENDENT,
+            statement("velocity and tilt"),
             same,
             ours=f"{speeds[0]:.6f} at α = 0.2, 0.4, 0.7",
-            remark="" if same else "The speed changes with the tilt.",
+            unless="The speed changes with the tilt.",
         ),
         judge(
-            numbers.EQUATION_8,
+            statement("eq. (8)"),
             slight,
             ours=f"at r = 0.5 by {usual:.1%} (γ = 0.01), {fast:.1%} (0.04), {gentle:.0%} (0.00058); "
             f"over r = 0 to 0.7 and γ = 0.01, 0.04 by {min(flat):.1%} to {max(flat):.1%}",

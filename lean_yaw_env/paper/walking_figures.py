@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lean_yaw_env.paper import numbers
+from lean_yaw_env.analysis.path import radius_of_walk
 from lean_yaw_env.paper.checks import compare, judge
 from lean_yaw_env.paper.drawing import FAINT, name_axes, new_figure, picture_of
+from lean_yaw_env.paper.numbers import LARGE_OFFSET, SMALL_OFFSET, number, statement
 from lean_yaw_env.paper.results import Columns, Result
 from lean_yaw_env.paper.steering import (
     asymptotic_heading,
     circling_gait,
-    circling_radius,
     settled_heading,
     turned,
-    turning_radius,
 )
 from lean_yaw_env.paper.walkers import table_1_gait
 from lean_yaw_env.parameters import WalkerParameters
@@ -54,7 +53,7 @@ def steering_walks(steps: int = _STEERING_STEPS) -> Steering:
         Walker().walk(
             steps, state=table_1_gait().state, mass_offset=offset, samples_per_step=_SAMPLES // 4
         )
-        for offset in (numbers.SMALL_OFFSET, numbers.LARGE_OFFSET)
+        for offset in (SMALL_OFFSET, LARGE_OFFSET)
     )
     return Steering(gentle, tight)
 
@@ -157,10 +156,10 @@ def figure_14() -> Result:
     gait = table_1_gait()
     return Result(
         checks=(
-            compare(numbers.STEP_LENGTH, gait.step_length),
-            compare(numbers.EXCURSION, excursion(walk)),
+            compare(number("step length"), gait.step_length),
+            compare(number("excursion"), excursion(walk)),
             compare(
-                numbers.FOOTPRINT_ANGLE,
+                number("footprint angle"),
                 float(gait.state[0]),
                 unless="Less by 1 %, more than rounding hides. Feet of finite mass are not the "
                 "reason: they make the angle smaller still (0.00152 at a mass of 0.001 each).",
@@ -186,22 +185,21 @@ def figure_15() -> Result:
     return Result(
         checks=(
             compare(
-                numbers.OFFSET_HEADING,
+                number("heading under an offset"),
                 settled_heading(),
                 remark=f"The heading approached; after the 500 steps drawn it is {reached:.3f}.",
             ),
             compare(
-                numbers.TURNING_RADIUS,
-                circling_radius(circling_gait()),
-                remark="Of the circle on a slope that turns along; on the fixed slope no arc is a "
-                f"circle: length walked over angle turned is {turning_radius(walks.tight):.1f} on "
-                "the first 90°.",
+                number("turning radius"),
+                circling_gait().turning_radius,
+                remark="Of the circle of the hip axle's middle on a slope that turns along; on the fixed slope "
+                f"the circle that fits its first 90° best has {radius_of_walk(Walker(), walks.tight):.1f}.",
             ),
             judge(
-                numbers.FALLS_PAST_90,
+                statement("tight turn's end"),
                 falls,
                 ours=_ending(walks.tight, angle),
-                remark="" if falls else "It does not fall, or falls earlier.",
+                unless="It does not fall, or falls earlier.",
             ),
         ),
         tables={

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
 import numpy as np
 
+from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.rendering.camera import Panel
-from lean_yaw_env.rendering.optional import require_pygame
 from lean_yaw_env.rendering.palette import Colour
 
 OVERSAMPLING = 2
@@ -29,9 +28,12 @@ class Canvas:
     """
 
     def __init__(self, width: int, height: int, background: Colour) -> None:
-        self._pygame = require_pygame()
+        with needs_extra("render"):
+            import pygame
+            import pygame.freetype
+        self._pygame: Any = pygame
+        self._freetype: Any = pygame.freetype
         self._size = (width, height)
-        self._freetype = importlib.import_module("pygame.freetype")
         # a depth of its own, not a display's: the same pixels with and without a window
         fine = (OVERSAMPLING * width, OVERSAMPLING * height)
         self._surface = self._pygame.Surface(fine, 0, 32)

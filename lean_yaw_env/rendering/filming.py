@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.files import require_ending, written_whole
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector
 from lean_yaw_env.rendering.geometry import Pose
-from lean_yaw_env.rendering.optional import require_ffmpeg, require_pillow, require_tqdm
 from lean_yaw_env.rendering.pygame_renderer import SIZE, Renderer
 from lean_yaw_env.rendering.scene import Scene, status_lines
 from lean_yaw_env.validation import require_number
@@ -107,7 +107,8 @@ def film(
     require_number("swing_share", swing_share, 0.0, 1.0)
     is_gif = place.suffix.lower() == ".gif"
     write, rate = (gif_writer(), gif_rate(fps)) if is_gif else (mp4_writer(), float(fps))
-    progress_bar = require_tqdm().tqdm if progress else None
+    with needs_extra("render"):
+        from tqdm import tqdm
     renderer = Renderer(size)
     walk = walker.walk(
         n_steps,
@@ -122,8 +123,8 @@ def film(
     hold = round(HOLD_SECONDS * rate) if walk.fall else 0
     scenes = (_scene(walker, recording, time, swing_share) for time in times)
     frames = _with_last_repeated((renderer.frame(scene) for scene in scenes), hold)
-    if progress_bar is not None:
-        frames = progress_bar(frames, total=len(times) + hold, desc=place.name, unit="frame")
+    if progress:
+        frames = tqdm(frames, total=len(times) + hold, desc=place.name, unit="frame")
     with written_whole(place) as temporary:
         write(temporary, frames, rate, renderer.size)
     return walk
@@ -251,11 +252,15 @@ def gif_rate(fps: float) -> float:
 
 def mp4_writer() -> Writer:
     """What writes frames as an .mp4; raises ``DependencyNotInstalled`` where ffmpeg is missing."""
-    ffmpeg = require_ffmpeg()
+    with needs_extra("render"):
+        import imageio_ffmpeg
+    write_frames: Any = (
+        imageio_ffmpeg.write_frames
+    )  # whose type hints know only its defaults' types
 
     def write(path: Path, frames: Iterable[Frame], fps: float, size: tuple[int, int]) -> None:
         # Macro blocks of 2 keep an even size as it is; the rest suits thin lines on an even ground
-        encoder = ffmpeg.write_frames(
+        encoder = write_frames(
             str(path),
             size,
             fps=fps,
@@ -276,13 +281,14 @@ def mp4_writer() -> Writer:
 
 def gif_writer() -> Writer:
     """What writes frames as a .gif; raises ``DependencyNotInstalled`` where pillow is missing."""
-    image = require_pillow()
+    with needs_extra("render"):
+        from PIL import Image
 
     def write(path: Path, frames: Iterable[Frame], fps: float, size: tuple[int, int]) -> None:
         # One palette for all frames: colours do not flicker, and what stays the same costs next to nothing
-        pictures = (image.fromarray(frame) for frame in frames)
-        first = next(pictures).quantize(128, dither=image.Dither.NONE)
-        rest = (picture.quantize(palette=first, dither=image.Dither.NONE) for picture in pictures)
+        pictures = (Image.fromarray(frame) for frame in frames)
+        first = next(pictures).quantize(128, dither=Image.Dither.NONE)
+        rest = (picture.quantize(palette=first, dither=Image.Dither.NONE) for picture in pictures)
         first.save(
             path,
             save_all=True,

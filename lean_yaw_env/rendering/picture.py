@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from lean_yaw_env.files import require_ending
 from lean_yaw_env.parameters import Foot, Vector
@@ -16,8 +18,14 @@ from lean_yaw_env.rendering.palette import FOOT_COLOURS, INK, STRONG_GRID, unit_
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-_MARGIN = 0.8  # leg lengths around the footprints
+_MARGIN = 1.0  # leg lengths around the footprints
+_LEAST_WIDTH = (
+    0.3  # of a panel, relative to its height: a straight walk would be a line without a width
+)
+_COLUMNS = 5
+_INCHES = 14.0  # at most, of all panels beside each other
 
 
 class WalkRecord(Protocol):
@@ -34,7 +42,11 @@ class WalkRecord(Protocol):
 
 
 def draw_footprints(
-    walks: Mapping[str, WalkRecord], axes: Sequence[Axes], *, foot_radius: float = 0.5
+    walks: Mapping[str, WalkRecord],
+    axes: Sequence[Axes],
+    *,
+    foot_radius: float = 0.5,
+    places: ArrayLike = (),
 ) -> None:
     """Draw footprints and the centre of mass's path from above, one walk to an axes, all to one
     scale; downhill is up.
@@ -47,6 +59,8 @@ def draw_footprints(
     axes : one for each walk
     foot_radius : [0, 1)
         Gives the prints' length.
+    places : shape (k, 2)
+        Further places on the floor that every axes must show, (downhill, right).
 
     Raises
     ------
@@ -57,17 +71,53 @@ def draw_footprints(
     if not walks or len(axes) != len(walks):
         raise ValueError(f"axes must be as many as walks, 1 or more: {len(axes)} and {len(walks)}")
     length = footprint_length(foot_radius)
-    low, high = _extent(walks)
-    for (name, walk), place in zip(walks.items(), axes, strict=True):
-        _draw_walk(place, walk, length)
-        place.set_title(name)
-        place.set_aspect("equal")
-        place.set_xlim(low[1], high[1])
-        place.set_ylim(low[0], high[0])
-        place.set_xlabel("right (leg lengths)")
-        place.grid(color=unit_colour(STRONG_GRID), linewidth=0.5)
-        place.set_axisbelow(True)
-    axes[0].set_ylabel("downhill (leg lengths)")
+    low, high = _extent(walks, places)
+    for (name, walk), panel in zip(walks.items(), axes, strict=True):
+        _draw_walk(panel, walk, length)
+        panel.set_title(name)
+        panel.set_aspect("equal")
+        panel.set_xlim(low[1], high[1])
+        panel.set_ylim(low[0], high[0])
+        panel.set_xlabel("right (leg lengths)")
+        panel.set_ylabel("downhill (leg lengths)")
+        panel.grid(color=unit_colour(STRONG_GRID), linewidth=0.5)
+        panel.set_axisbelow(True)
+
+
+def footprint_figure(
+    walks: Mapping[str, WalkRecord], *, foot_radius: float = 0.5, places: ArrayLike = ()
+) -> tuple[Figure, list[Axes]]:
+    """A figure of ``draw_footprints`` in lines of up to five panels, and the panels in the walks' order.
+
+    Raises
+    ------
+    ValueError
+        If there are no walks.
+    gymnasium.error.DependencyNotInstalled
+        If matplotlib is not installed.
+    """
+    if not walks:
+        raise ValueError("walks must hold one walk or more, got none")
+    low, high = _extent(walks, places)
+    lines = math.ceil(len(walks) / _COLUMNS)
+    columns = math.ceil(len(walks) / lines)  # lines of equal length, but for the last
+    # As tall as wide a panel would be, within bounds that suit a page
+    shape = float(np.clip((high[0] - low[0]) / (high[1] - low[1]), 0.4, 3.0))
+    width = min(4.0, _INCHES / columns, 7.5 / shape)
+    figure = new_figure(width * columns + 0.9, (width * shape + 0.8) * lines + 0.3)
+    # The layout for panels whose sides have a fixed ratio; the usual one pushes their titles off the picture
+    figure.set_layout_engine("compressed")
+    grid = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
+    panels, spare = list(grid.flat)[: len(walks)], list(grid.flat)[len(walks) :]
+    for panel in spare:
+        panel.remove()
+    draw_footprints(walks, panels, foot_radius=foot_radius, places=places)
+    for k, panel in enumerate(panels):
+        is_lowest = k + columns >= len(panels)
+        panel.tick_params(labelbottom=is_lowest)
+        panel.xaxis.label.set_visible(is_lowest)
+        panel.yaxis.label.set_visible(k % columns == 0)
+    return figure, panels
 
 
 def save_footprints(
@@ -83,24 +133,14 @@ def save_footprints(
         If matplotlib is not installed.
     """
     require_ending(path, ENDINGS)
-    if not walks:
-        raise ValueError("walks must hold one walk or more, not none")
-    low, high = _extent(walks)
-    # as tall as wide a panel would be, within bounds that suit a page
-    shape = min(max((high[0] - low[0]) / (high[1] - low[1]), 0.4), 2.5)
-    width = min(4.0, 9.0 / shape)
-    figure = new_figure(width * len(walks) + 0.9, width * shape + 1.1)
-    axes = figure.subplots(1, len(walks), sharex=True, sharey=True, squeeze=False)
-    draw_footprints(walks, list(axes[0]), foot_radius=foot_radius)
-    save_figure(figure, path)
+    save_figure(footprint_figure(walks, foot_radius=foot_radius)[0], path)
 
 
-def _extent(walks: Mapping[str, WalkRecord]) -> tuple[Vector, Vector]:
-    points = np.vstack([walk.footprints for walk in walks.values()])
+def _extent(walks: Mapping[str, WalkRecord], places: ArrayLike) -> tuple[Vector, Vector]:
+    """Corners (downhill, right) of what holds every footprint and place, wide enough to be a picture."""
+    points = np.vstack([*(walk.footprints for walk in walks.values()), np.reshape(places, (-1, 2))])
     low, high = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
-    # a straight walk would be a line without a width
-    least = 0.25 * (high - low).max()
-    short = np.maximum(least - (high - low), 0.0)
+    short = np.maximum(_LEAST_WIDTH * (high - low).max() - (high - low), 0.0)
     return low - 0.5 * short, high + 0.5 * short
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.rendering.body_views import draw_rear_view, draw_side_view
 from lean_yaw_env.rendering.camera import Panel
 from lean_yaw_env.rendering.canvas import Canvas
 from lean_yaw_env.rendering.geometry import walker_shape
-from lean_yaw_env.rendering.optional import require_pygame
 from lean_yaw_env.rendering.palette import BACKGROUND
 from lean_yaw_env.rendering.scene import Scene
 from lean_yaw_env.rendering.top_view import draw_top_view
@@ -20,6 +21,8 @@ from lean_yaw_env.validation import require_count, require_number
 SIZE = (960, 540)
 """Width and height of a picture, pixels."""
 LEAST_SIZE, GREATEST_SIZE = (480, 360), (3840, 2160)
+_INVISIBLE = ("offscreen", "dummy", "evdev")
+"""SDL's drivers without a window, taken where there is no display; who names one in ``SDL_VIDEODRIVER`` wants it."""
 _GAP = 6.0
 _TOP_SHARE = 0.585  # of the width, for the view from above
 
@@ -42,7 +45,9 @@ class Renderer:
 
     def __init__(self, size: tuple[int, int] = SIZE) -> None:
         self.size = _require_size(size)
-        self._pygame = require_pygame()
+        with needs_extra("render"):
+            import pygame
+        self._pygame: Any = pygame
         self._canvas = Canvas(*self.size, BACKGROUND)
         self._window: Any = None
         self._clock: Any = None
@@ -90,14 +95,18 @@ class Renderer:
 
     def _opened_window(self) -> Any:
         if self._window is None:
+            display = self._pygame.display
             try:
-                self._pygame.display.init()
-                self._window = self._pygame.display.set_mode(self.size)
+                display.init()
+                if display.get_driver() in _INVISIBLE and "SDL_VIDEODRIVER" not in os.environ:
+                    display.quit()
+                    raise self._pygame.error("there is no display")
+                self._window = display.set_mode(self.size)
             except self._pygame.error as error:
                 raise RuntimeError(
                     f"no window could be opened ({error}); without a display, ask for arrays"
                 ) from error
-            self._pygame.display.set_caption("Lean-to-yaw walker")
+            display.set_caption("Lean-to-yaw walker")
             self._clock = self._pygame.time.Clock()
         return self._window
 

@@ -33,6 +33,8 @@ GREATEST_SCALE, LEAST_SCALE = 130.0, 22.0
 
 A longer walk is followed, and seen whole in an inset.
 """
+WORDS_WIDTH = 220.0
+"""Pixels from the panel's left edge in which a walker makes room for the words."""
 _MOST_PATH_POINTS = 1500
 _FULL_OUTLINE = 16.0  # a print shorter than this, in pixels, needs fewer corners
 _COARSE = 2 * CORNERS_PER_KNOT
@@ -53,7 +55,7 @@ def draw_top_view(canvas: Canvas, panel: Panel, scene: Scene, shape: WalkerShape
     _draw_arrows(canvas, camera, scene, walker)
     _draw_scale(canvas, camera)
     _draw_downhill(canvas, camera, scene)
-    _draw_words(canvas, panel, scene)
+    _draw_words(canvas, camera, scene, walker)
     if not camera.sees(scene.path).all():
         _draw_inset(canvas, camera, scene, walker)
     canvas.clip(None)
@@ -179,9 +181,15 @@ def _draw_downhill(canvas: Canvas, camera: FloorCamera, scene: Scene) -> None:
     )
 
 
-def _draw_words(canvas: Canvas, panel: Panel, scene: Scene) -> None:
+def _draw_words(canvas: Canvas, camera: FloorCamera, scene: Scene, walker: Vector) -> None:
+    """The scene's lines in the upper left corner, or in the upper right one if the walker is up there."""
+    panel = camera.panel
+    right, down = camera.pixels(walker) - (panel.left, panel.top)
+    is_hidden = right < WORDS_WIDTH and down < 19.0 * len(scene.lines) + 32.0
+    side, left = (1.0, panel.right - 16.0) if is_hidden else (0.0, panel.left + 16.0)
     for i, line in enumerate(scene.lines):
-        canvas.text(line, (panel.left + 16.0, panel.top + 16.0 + 19.0 * i), INK, 13.0, ground=FLOOR)
+        place = (left, panel.top + 16.0 + 19.0 * i)
+        canvas.text(line, place, INK, 13.0, anchor=(side, 0.0), ground=FLOOR)
 
 
 def _draw_inset(canvas: Canvas, camera: FloorCamera, scene: Scene, walker: Vector) -> None:

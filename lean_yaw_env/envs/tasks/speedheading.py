@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from lean_yaw_env.envs import columns as c
-from lean_yaw_env.envs.running import run_many, run_one, start_row
+from typing import Any
+
+from lean_yaw_env.envs.formulas import closeness
+from lean_yaw_env.envs.state import Field
 from lean_yaw_env.envs.tasks.heading import (
-    COMMAND,
     EFFORT_RATE,
-    ERROR_SCALE,
     HEADING_COMMAND,
-    HEADING_END,
     HEADING_FEATURE,
     HEADING_METRICS,
     LARGEST_SLOPE_COMMAND,
@@ -17,20 +16,14 @@ from lean_yaw_env.envs.tasks.heading import (
     SHORTEST_COMMAND,
     TRACKING_WIDTH,
     WALKING_RATE,
-    closeness,
-    command_runs_out,
     follow_heading,
     heading_error,
-    new_heading_command,
+    heading_fields,
+    new_heading,
 )
 from lean_yaw_env.envs.tasks.task import Command, Feature, Metric, Task
-from lean_yaw_env.envs.transition import effort, limited, mirror_sign
-from lean_yaw_env.kernel.compilation import entry_point, inlined
+from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.kernel.random import uniform
-
-SPEED = HEADING_END  # commanded
-LAST_SPEED = HEADING_END + 1  # of the last step
-SPEED_ERROR_SUM = HEADING_END + 2  # absolute speed error times duration
 
 # On a slope of 0.01 the gait walks at 0.68 with an inter-leg angle of 0.15 and at 0.25 with one of 0.45; 0.6 rad off downhill at 0.60
 # and 0.10: all these commands are within reach of the default action.
@@ -42,81 +35,58 @@ TRACKING_RATE = 0.4  # for each of the two
 SPEED_WIDTH = 0.05  # the speed error at which half of its tracking rate is left
 
 
-@inlined
-def new_command(memory, stream, settings, i):
-    new_heading_command(memory, stream, settings, i)
-    memory[i, SPEED] = uniform(stream, i, LEAST_SPEED, GREATEST_SPEED)
+@formula
+def start(walker: Any, task: Any) -> None:
+    new_heading(walker, task)
+    task.commanded_speed = uniform(walker, LEAST_SPEED, GREATEST_SPEED)
 
 
-@inlined
-def task_begin(memory, stream, settings, i):
-    new_command(memory, stream, settings, i)
+@formula
+def speed_error(walker: Any, task: Any) -> Any:
+    """The commanded speed relative to the last step's."""
+    return task.commanded_speed - walker.speed
 
 
-@inlined
-def task_reward(memory, stream, settings, actions, outcomes, i, walks):
-    if not walks:
-        return 0.0, True
-    duration = outcomes[i, c.OUTCOME_DURATION]
-    memory[i, LAST_SPEED] = memory[i, c.ADVANCE] / duration
-    error = follow_heading(memory, i, duration)
-    speed_error = abs(memory[i, SPEED] - memory[i, LAST_SPEED])
-    memory[i, SPEED_ERROR_SUM] += speed_error * duration
-    rate = (
-        WALKING_RATE
-        + TRACKING_RATE * (closeness(error, TRACKING_WIDTH) + closeness(speed_error, SPEED_WIDTH))
-        - EFFORT_RATE * effort(actions, i)
+@formula
+def reward(walker: Any, task: Any) -> Any:
+    close = closeness(heading_error(walker, task), TRACKING_WIDTH) + closeness(
+        speed_error(walker, task), SPEED_WIDTH
     )
-    if command_runs_out(memory, i):
-        new_command(memory, stream, settings, i)
-    return rate * duration, False
+    rate = WALKING_RATE + TRACKING_RATE * close - EFFORT_RATE * walker.effort
+    return rate * walker.duration
 
 
-@inlined
-def task_features(memory, settings, observations, i, column):
-    sign = mirror_sign(memory, settings, i)
-    observations[i, column] = limited(sign * heading_error(memory, i) / ERROR_SCALE)
-    observations[i, column + 1] = limited((memory[i, SPEED] - SPEED_CENTRE) / SPEED_SCALE)
-    walked = memory[i, c.STEPS] > 0.0
-    lacks = memory[i, SPEED] - memory[i, LAST_SPEED] if walked else 0.0
-    observations[i, column + 2] = limited(lacks / SPEED_ERROR_SCALE)
+@formula
+def update(walker: Any, task: Any) -> bool:
+    runs_out = follow_heading(walker, task)
+    task.speed_error_sum += abs(speed_error(walker, task)) * walker.duration
+    if runs_out:
+        start(walker, task)
+    return False
 
 
-@entry_point()
-def step_one(
-    bodies, memory, stream, settings, actions, outcomes, observations, rewards, terminated, truncated,
-):  # fmt: skip
-    return run_one(
-        bodies, memory, stream, settings, actions, outcomes, observations, rewards, terminated,
-        truncated, task_reward, task_features,
-    )  # fmt: skip
-
-
-@entry_point()
-def step_many(
-    bodies, memory, stream, settings, actions, outcomes, observations, rewards, terminated, truncated,
-    commands, states, sides, skip, first, last,
-):  # fmt: skip
-    return run_many(
-        bodies, memory, stream, settings, actions, outcomes, observations, rewards, terminated,
-        truncated, commands, states, sides, skip, first, last, task_reward, task_features,
-    )  # fmt: skip
-
-
-@entry_point()
-def start_many(bodies, memory, stream, settings, observations, rows, fresh):
-    for i in rows:
-        start_row(
-            bodies, memory, stream, settings, observations, i, fresh, task_begin, task_features
-        )
+@formula
+def features(walker: Any, task: Any) -> Any:
+    error = speed_error(walker, task)
+    return (
+        heading_error(walker, task),
+        task.commanded_speed,
+        error if walker.steps > 0 else 0.0 * error,
+    )
 
 
 TASK = Task(
     name="SpeedHeading",
-    step_one=step_one,
-    step_many=step_many,
-    start_many=start_many,
-    features=(
+    fields=(
+        *heading_fields(LARGEST_SLOPE_COMMAND),
+        Field("commanded_speed", "", "commanded speed"),
+        Field("speed_error_sum", "time units", "absolute speed error times duration"),
+    ),
+    start=start,
+    reward=reward,
+    update=update,
+    features=features,
+    observed=(
         HEADING_FEATURE,
         Feature("commanded_speed", SPEED_SCALE, "", "commanded speed", SPEED_CENTRE),
         Feature(
@@ -128,18 +98,17 @@ TASK = Task(
     ),
     metrics={
         **HEADING_METRICS,
-        "mean_absolute_speed_error": Metric(SPEED_ERROR_SUM, c.TIME, "over time", "lower"),
-        "commanded_speed": Metric(SPEED, None, "in force"),
+        "mean_absolute_speed_error": Metric("speed_error_sum", "time", "over time", "lower"),
+        "commanded_speed": Metric("commanded_speed", None, "in force"),
     },
     summary=f"Walk where and as fast as you are told: a heading within {LARGEST_SLOPE_COMMAND} rad of downhill and a speed from "
     f"{LEAST_SPEED:.2f} to {GREATEST_SPEED:.2f}, commanded anew together every {SHORTEST_COMMAND} to {LONGEST_COMMAND} steps.",
-    reward=f"{WALKING_RATE} + {TRACKING_RATE} / (1 + (heading error / {TRACKING_WIDTH})^2) + {TRACKING_RATE} / (1 + (speed error / "
+    reward_text=f"{WALKING_RATE} + {TRACKING_RATE} / (1 + (heading error / {TRACKING_WIDTH})^2) + {TRACKING_RATE} / (1 + (speed error / "
     f"{SPEED_WIDTH})^2) - {EFFORT_RATE} effort",
     history=("0: the first.",),
     commands={
         "command": HEADING_COMMAND,
-        "speed": Command((SPEED,), LEAST_SPEED, GREATEST_SPEED, "speed"),
+        "speed": Command(("commanded_speed",), LEAST_SPEED, GREATEST_SPEED, "speed"),
     },
-    command_column=COMMAND,
-    constants=(LARGEST_SLOPE_COMMAND,),
+    heading_field="command",
 )

@@ -1,0 +1,129 @@
+"""Experience discounted in time: a walking step's length is the policy's choice, and must not be paid for.
+
+With one discount for every step, long or short, a rate of reward R earns R times duration / (1 - discount): a policy gains by taking
+longer steps at the same rate. With a discount of exp(-duration / time constant) for each step it earns R times the time constant, whatever the
+steps, since a step's reward, spread evenly over its duration, is discounted within the step too.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3.common.buffers import ReplayBuffer, RolloutBuffer
+from stable_baselines3.common.type_aliases import ReplayBufferSamples
+from stable_baselines3.common.vec_env import VecNormalize
+
+from .recorder import Arrays
+
+_COLUMNS = (
+    "observations", "next_observations", "actions", "rewards", "dones", "timeouts", "durations",
+)  # fmt: skip
+
+
+def mean_discount(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean of exp(-t / time constant) over steps of durations ``ratio`` times the time constant; 1 at its limit of no duration."""
+    return np.where(ratio > 0.0, -np.expm1(-ratio) / np.where(ratio > 0.0, ratio, 1.0), 1.0)
+
+
+class TimeDiscountedBuffer(RolloutBuffer):
+    """Stable-Baselines3's rollout buffer with a discount of exp(-duration / time constant) for each step.
+
+    ``durations`` (steps, walkers) is to be filled while experience is collected; 0 where an episode ended.
+    """
+
+    time_constant: float
+    durations: NDArray[np.float64]
+
+    def __init__(self, *arguments: Any, time_constant: float, **keywords: Any) -> None:
+        self.time_constant = time_constant
+        super().__init__(*arguments, **keywords)
+
+    def reset(self) -> None:
+        """Empty the buffer."""
+        super().reset()
+        self.durations = np.zeros((self.buffer_size, self.n_envs))
+
+    def compute_returns_and_advantage(
+        self, last_values: torch.Tensor, dones: NDArray[np.bool_]
+    ) -> None:
+        """Generalised advantage estimates (Schulman et al. 2016), with each step's own discount."""
+        values = np.vstack([self.values, last_values.cpu().numpy().reshape(1, -1)])
+        goes_on = 1.0 - np.vstack([self.episode_starts[1:], np.asarray(dones).reshape(1, -1)])
+        ratio = self.durations / self.time_constant
+        discounts = np.exp(-ratio) * goes_on
+        surprises = self.rewards * mean_discount(ratio) + discounts * values[1:] - values[:-1]
+        advantage = np.zeros(self.n_envs)
+        for step in reversed(range(self.buffer_size)):
+            advantage = surprises[step] + discounts[step] * self.gae_lambda * advantage
+            self.advantages[step] = advantage
+        self.returns = self.advantages + self.values
+
+
+class TimeDiscountedReplay(ReplayBuffer):
+    """Stable-Baselines3's replay buffer with a discount of exp(-duration / time constant) for each step.
+
+    What an algorithm multiplies the next value by is (1 - done) times its own discount, so that here ``dones``
+    are one less the step's discount, and the algorithm's own must be 1.
+
+    Parameters
+    ----------
+    time_constant : simulated time
+    typical_duration : stands in for that of an episode's last step, which no environment tells once it has begun the next
+
+    ``durations`` (steps, walkers) is to be filled before each ``add``.
+    """
+
+    def __init__(
+        self, *arguments: Any, time_constant: float, typical_duration: float, **keywords: Any
+    ) -> None:
+        super().__init__(*arguments, **keywords)
+        self.time_constant = time_constant
+        self.typical_duration = typical_duration
+        self.durations: NDArray[np.float64] = np.zeros((self.buffer_size, self.n_envs))
+
+    def add(
+        self,
+        obs: NDArray[Any],
+        next_obs: NDArray[Any],
+        action: NDArray[Any],
+        reward: NDArray[Any],
+        done: NDArray[Any],
+        infos: list[dict[str, Any]],
+    ) -> None:
+        """Take a step of all walkers."""
+        self.durations[self.pos][np.asarray(done, dtype=np.bool_)] = self.typical_duration
+        super().add(obs, next_obs, action, reward, done, infos)
+
+    def captured(self) -> Arrays:
+        """The experience there is, and where the next goes."""
+        filled = self.buffer_size if self.full else self.pos
+        arrays: Arrays = {name: getattr(self, name)[:filled] for name in _COLUMNS}
+        return arrays | {"position": np.array([self.pos, filled])}
+
+    def restore(self, arrays: Arrays) -> None:
+        """Bring the buffer to what ``captured`` gave, or raise ``KeyError`` or ``ValueError`` if it is another buffer's."""
+        self.pos, filled = (int(value) for value in arrays["position"])
+        self.full = filled == self.buffer_size
+        for name in _COLUMNS:
+            getattr(self, name)[:filled] = arrays[name]
+
+    def _get_samples(
+        self, batch_inds: NDArray[np.int64], env: VecNormalize | None = None
+    ) -> ReplayBufferSamples:
+        walkers = np.random.randint(0, self.n_envs, len(batch_inds))  # noqa: NPY002 - as SB3 draws
+        index = (batch_inds, walkers)
+        ratio = self.durations[index] / self.time_constant
+        fell = self.dones[index] * (1.0 - self.timeouts[index])
+        cut = 1.0 - (1.0 - fell) * np.exp(-ratio)
+        rewards = self._normalize_reward(self.rewards[index], env) * mean_discount(ratio)
+        data = (
+            np.asarray(self._normalize_obs(self.observations[index], env)),
+            self.actions[index],
+            np.asarray(self._normalize_obs(self.next_observations[index], env)),
+            cut.astype(np.float32)[:, None],
+            rewards.astype(np.float32)[:, None],
+        )
+        return ReplayBufferSamples(*(self.to_torch(array) for array in data))

@@ -1,0 +1,82 @@
+"""What comes with the package: policies of finished runs and settings that were tuned, put in place on request only."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.files import read_json, write_json
+
+from .learning.series import is_series, runs_of
+from .learning.training import EVALUATION_FILE
+from .policies.storage import load, save, shipping_folder
+from .settings import all_settings, keep_settings, with_values
+from .tuning.spaces import space_of
+
+
+def ship(source: Path, *, replace: bool = False) -> list[Path]:
+    """Put what a run, a series of runs or a tuning left where the package finds it; return the places.
+
+    Parameters
+    ----------
+    source : folder of a finished run or series that ``train`` left, or JSON file that ``tune`` left
+    replace : whether something else may be there already
+
+    Raises
+    ------
+    ValueError
+        If the source is none of these or not finished, or something is there already and ``replace`` is not set.
+    """
+    if source.is_file():
+        return [ship_settings(source, replace=replace)]
+    runs = runs_of(source).values() if is_series(source) else (source,)
+    return [ship_policy(run, replace=replace) for run in runs]
+
+
+def ship_policy(run: Path, *, replace: bool = False) -> Path:
+    """Copy a finished run's policy, and how it was judged, to where ``load`` finds the package's agents.
+
+    Raises
+    ------
+    ValueError
+        If the run is not finished, it trained for other than the environment's own options, or there is an agent already and
+        ``replace`` is not set; nothing has changed then.
+    """
+    card = (policy := load(run)).card
+    evaluation = run / EVALUATION_FILE
+    if not evaluation.exists():
+        raise ValueError(f"the run in {str(run)!r} is not finished")
+    rows = [row for row in read_json(evaluation) if row["agent"] == card.algorithm]
+    if card.options != EnvOptions():
+        raise ValueError(
+            f"options of {str(run)!r} must be the environment's own, got {card.options}"
+        )
+    folder = shipping_folder(card.env_id, card.algorithm, card.seed)
+    if folder.exists() and not replace:
+        raise ValueError(f"there is an agent in {str(folder)!r} already; replace it by --replace")
+    save(policy, folder)
+    write_json(folder / EVALUATION_FILE, rows)
+    return folder
+
+
+def ship_settings(file: Path, *, replace: bool = False) -> Path:
+    """Put the best settings of a tuning among those that come with the package.
+
+    Raises
+    ------
+    ValueError
+        If the file is not a tuning's, its values are not settings of its agent, or there are other ones already and ``replace`` is
+        not set; nothing has changed then.
+    """
+    record = read_json(file)
+    try:
+        agent, task, values = (record[key] for key in ("agent", "task", "values"))
+        with_values(type(space_of(agent, task).settings)(), values)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"{str(file)!r} is not what a tuning leaves: {error}") from error
+    there = all_settings().get(agent, {}).get(task, {})
+    if there and there != values and not replace:
+        raise ValueError(
+            f"there are settings of {agent} for {task} already; replace them by --replace"
+        )
+    return keep_settings(agent, task, values)

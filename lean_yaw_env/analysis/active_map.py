@@ -1,0 +1,418 @@
+"""The active walker's section map at a constant command, and where its gaits are looked for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lean_yaw_env.analysis.fixed_point import (
+    follow_fixed_point,
+    side_of_folds,
+    solve_fixed_point,
+)
+from lean_yaw_env.analysis.section_map import (
+    BODY_PARAMETERS,
+    FEET_IN_TURN,
+    CycleStep,
+    Linearised,
+    SectionMap,
+    section_map_of,
+)
+from lean_yaw_env.analysis.stride import differentiate_step, require_offsets
+from lean_yaw_env.errors import NoGaitError
+from lean_yaw_env.kernel.batch import step_batch
+from lean_yaw_env.kernel.records import Command, Outcome
+from lean_yaw_env.parameters import (
+    INTER_LEG_ANGLE,
+    MIRROR,
+    STATE_FIELDS,
+    STATE_SIZE,
+    Foot,
+    Vector,
+    WalkerParameters,
+    require_inter_leg_angle,
+    require_state,
+)
+from lean_yaw_env.validation import require_choice, require_count
+from lean_yaw_env.walker import StepResult, Walker, require_completed
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+COMMAND_PARAMETERS = ("inter_leg_angle", "mass_offset", "alternating_offset")
+"""Parameters of the active walker only.
+
+``mass_offset`` is the mean of both feet's offsets, ``alternating_offset`` what the left foot's has
+more than that: positive moves the masses away from the stance foot.
+"""
+
+_ARRIVED = 1e-9
+_HELPING_SLOPES = (0.01, 0.02)
+"""Where to start from a gait that a slope drives, on the way to one that pumping drives."""
+_STATUS = Outcome._fields.index("status")
+_OFFSET = Outcome._fields.index("mass_offset")
+
+
+@dataclass(frozen=True)
+class ActiveMap(SectionMap):
+    """Steps of the active walker at a constant inter-leg angle, with an offset for each foot.
+
+    Attributes
+    ----------
+    walker : Walker
+    inter_leg_angle : float
+    mass_offset : (float, float)
+        In force while the left and while the right foot stands; the masses move from the one to
+        the other at the start of each step.
+    n_steps : int
+        An odd number needs opposite offsets, which are each other's mirror image.
+    """
+
+    walker: Walker
+    inter_leg_angle: float = INTER_LEG_ANGLE
+    mass_offset: tuple[float, float] = (0.0, 0.0)
+    n_steps: int = 2
+
+    parameters = BODY_PARAMETERS + COMMAND_PARAMETERS
+    names = tuple(field.name for field in STATE_FIELDS)
+    mirror = MIRROR
+    zero_explanation = (
+        "section: the swing leg is held at a fixed angle, and two legs at a fixed angle with both "
+        "feet on the floor determine the stance pitch from the ankle angle, so that the state "
+        "after a strike has one freedom less than the section"
+    )
+
+    def __post_init__(self) -> None:
+        require_inter_leg_angle(self.inter_leg_angle)
+        require_offsets(self.mass_offset)
+        require_count("n_steps", self.n_steps)
+        if self.n_steps % 2 and not self.is_symmetric:
+            raise ValueError(
+                "an odd number of steps needs mass offsets that are opposite for the two feet, "
+                f"got {self.mass_offset}"
+            )
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether a step on the right foot is the mirror image of one on the left."""
+        return self.mass_offset[0] == -self.mass_offset[1]
+
+    @property
+    def free(self) -> list[int]:
+        return [0, 1, 2, 3, 4] if has_downhill(self.walker.parameters) else [1, 2, 3, 4]
+
+    @property
+    def stander(self) -> Walker:
+        return self.walker
+
+    @property
+    def carried(self) -> float:
+        """The offset that the step before has left."""
+        return self.mass_offset[1]
+
+    def require_state(self, state: ArrayLike) -> Vector:
+        return require_state(state)
+
+    def results(self, state: Vector) -> list[CycleStep]:
+        """The steps themselves; ``NoGaitError`` if a heel strike comes before the masses have arrived at their offset."""
+        steps: list[CycleStep] = []
+        for k in range(self.n_steps):
+            command, foot = self._command(k), FEET_IN_TURN[k % 2]
+            result = require_completed(
+                self.walker.step(
+                    state,
+                    stance=foot,
+                    inter_leg_angle=command[0],
+                    mass_offset=command[1],
+                    previous_offset=command[2],
+                ),
+                f"step {k + 1} of the gait",
+            )
+            if abs(result.mass_offset - command[1]) > _ARRIVED:
+                raise NoGaitError(
+                    f"the heel strike after {result.duration:.3f} comes before the masses have "
+                    f"moved to {command[1]:g}; a shorter shift_time lets them arrive"
+                )
+            steps.append(cycle_step(state, result.state, foot, command, result))
+            state = result.state
+        return steps
+
+    def linear_step(self, state: Vector, k: int, parameter: str | None) -> Linearised:
+        step = differentiate_step(
+            self.walker, state, FEET_IN_TURN[k % 2], self._command(k), with_body=parameter is not None
+        )
+        by_parameter = np.zeros(STATE_SIZE)
+        if parameter is not None:
+            by_inputs = step.jacobian[:STATE_SIZE, STATE_SIZE:]
+            by_parameter = by_inputs @ self._direction(parameter, k)
+        return Linearised(
+            step.state, step.by_state, by_parameter, np.zeros((STATE_SIZE, STATE_SIZE))
+        )
+
+    def step_many(self, states: Vector, carried: Vector, foot: int) -> tuple[Vector, Vector, Vector]:
+        n = len(states)
+        commands = np.column_stack(
+            [np.full(n, self.inter_leg_angle), np.full(n, self.mass_offset[foot]), carried]
+        )
+        rows = step_rows(self._bodies, commands, states, foot)
+        return rows[:, :STATE_SIZE], rows[:, _OFFSET], rows[:, _STATUS]
+
+    def search(self) -> Iterator[Vector]:
+        yield search_active(self, exact=True)
+
+    def value(self, parameter: str) -> float:
+        require_choice("parameter", parameter, self.parameters)
+        left, right = self.mass_offset
+        commands = {
+            "inter_leg_angle": self.inter_leg_angle,
+            "mass_offset": 0.5 * (left + right),
+            "alternating_offset": 0.5 * (left - right),
+        }
+        if parameter in commands:
+            return commands[parameter]
+        return getattr(self.walker.parameters, parameter)
+
+    def moved(self, parameter: str, value: float) -> Self:
+        require_choice("parameter", parameter, self.parameters)
+        if parameter == "inter_leg_angle":
+            return replace(self, inter_leg_angle=require_inter_leg_angle(value))
+        if parameter == "mass_offset":
+            apart = self.value("alternating_offset")
+            return replace(self, mass_offset=(value + apart, value - apart))
+        if parameter == "alternating_offset":
+            mean = self.value("mass_offset")
+            return replace(self, mass_offset=(mean + value, mean - value))
+        return replace(self, walker=moved_walker(self.walker, parameter, value))
+
+    def over(self, n_steps: int) -> Self:
+        return replace(self, n_steps=n_steps)
+
+    def along(self, parameter: str) -> Self:
+        # the same offset for both feet, but for none, is no mirror image of itself
+        return self.over(2) if parameter == "mass_offset" and self.n_steps == 1 else self
+
+    def question(self) -> dict[str, Any]:
+        return {
+            "walker": "Walker",
+            "parameters": asdict(self.walker.parameters),
+            "inter_leg_angle": self.inter_leg_angle,
+            "mass_offset": list(self.mass_offset),
+        }
+
+    @cached_property
+    def _bodies(self) -> Vector:
+        return np.array([self.walker.parameters.body()])
+
+    def _command(self, k: int) -> Command:
+        return Command(self.inter_leg_angle, self.mass_offset[k % 2], self.mass_offset[(k + 1) % 2])
+
+    def _direction(self, parameter: str, k: int) -> Vector:
+        """How a parameter enters the inputs of step ``k`` after the state: the command, then the body."""
+        require_choice("parameter", parameter, self.parameters)
+        direction = np.zeros(3 + len(BODY_PARAMETERS))
+        if parameter in BODY_PARAMETERS:
+            direction[3 + BODY_PARAMETERS.index(parameter)] = 1.0
+            return direction
+        sign = 1.0 if k % 2 == 0 else -1.0
+        direction[:3] = {
+            "inter_leg_angle": (1.0, 0.0, 0.0),
+            "mass_offset": (0.0, 1.0, 1.0),
+            "alternating_offset": (0.0, sign, -sign),
+        }[parameter]
+        return direction
+
+
+def has_downhill(parameters: WalkerParameters) -> bool:
+    """Whether headings differ: not on the level, nor where the slope turns with the walker."""
+    return parameters.slope != 0.0 and not parameters.slope_turns
+
+
+def moved_walker(walker: Walker, parameter: str, value: float) -> Walker:
+    """The walker with another value of one of ``BODY_PARAMETERS``."""
+    return Walker(replace(walker.parameters, **{parameter: value}))
+
+
+def step_rows(bodies: Vector, commands: Vector, states: Vector, foot: int) -> Vector:
+    """Step many walkers on the left (0) or right (1) foot, unchecked; rows (n, 18) in the order of ``kernel.records.Outcome``."""
+    n = len(states)
+    rows = np.empty((n, len(Outcome._fields)))
+    sides = np.full(n, 1.0 - 2.0 * foot)
+    step_batch(bodies, commands, np.ascontiguousarray(states), sides, rows, 0, n)
+    return rows
+
+
+def cycle_step(
+    start: Vector, end: Vector, foot: Foot, command: Command, result: StepResult
+) -> CycleStep:
+    """An active walker's step between two states of its map."""
+    return CycleStep(
+        start=start,
+        state=end,
+        foot=foot,
+        command=command,
+        duration=result.duration,
+        displacement=result.displacement,
+        least_normal_force=result.least_normal_force,
+        greatest_friction=result.greatest_friction,
+        gravity_work=result.energy.gravity_work,
+        shift_work=result.energy.shift_work,
+    )
+
+
+@section_map_of.register
+def _(
+    walker: Walker,
+    *,
+    inter_leg_angle: float = INTER_LEG_ANGLE,
+    mass_offset: float | tuple[float, float] = 0.0,
+    n_steps: int | None = None,
+) -> ActiveMap:
+    offsets = require_offsets(mass_offset)
+    fewest = 1 if offsets[0] == -offsets[1] else 2
+    angle = require_inter_leg_angle(inter_leg_angle)
+    return ActiveMap(walker, angle, offsets, fewest if n_steps is None else n_steps)
+
+
+def planar_gait_rate(walker: Walker, inter_leg_angle: float, heading: float = 0.0) -> float:
+    """Stance pitch rate just after heel strike of the planar active walker, in closed form.
+
+    Without hip width, one step multiplies the squared rate by k^2, k the planar impact's ratio,
+    after gravity has added the slope's work. Returns nan where the slope gives no energy, or no
+    impact takes any.
+    """
+    parameters = walker.parameters
+    return planar_rate(parameters.foot_radius, parameters.slope, inter_leg_angle, heading)
+
+
+def planar_rate(foot_radius: float, slope: float, inter_leg_angle: float, heading: float) -> float:
+    """``planar_gait_rate`` of a walker given by its numbers."""
+    half = 0.5 * inter_leg_angle
+    level = foot_radius + (1.0 - foot_radius) * math.cos(half)
+    lift = (1.0 - foot_radius) * math.sin(half)
+    inertia = level**2 + lift**2
+    kept = (level**2 - lift**2) / inertia
+    step_length = 2.0 * (foot_radius * half + lift)
+    gained = 2.0 * step_length * math.sin(slope) * math.cos(heading) / inertia
+    if gained <= 0.0 or kept**2 >= 1.0:
+        return math.nan
+    return -math.sqrt(gained * kept**2 / (1.0 - kept**2))
+
+
+def search_active(section_map: ActiveMap, *, exact: bool) -> Vector:
+    """The state of the gait: solved from the planar gait's closed form; failing that, followed from a simpler one.
+
+    Where a fast and a slow gait exist, which meet at a fold, it is the one that the planar gait leads to.
+
+    Parameters
+    ----------
+    section_map : ActiveMap
+    exact : bool
+        See ``solve_fixed_point``; without the Jacobian the two gaits are not told apart.
+
+    Raises
+    ------
+    NoGaitError
+        If no gait was found; says what was tried.
+    """
+    tried: list[str] = []
+    guess = _planar_guess(section_map)
+    if guess is None:
+        tried.append(
+            "the planar gait has no closed form here: the slope gives no energy along any heading "
+            "that balances the offset"
+        )
+    else:
+        try:
+            return _from_planar(section_map, guess, exact)
+        except NoGaitError as error:
+            tried.append(f"from the planar gait: {error}")
+        try:
+            return _widened(section_map, exact)
+        except NoGaitError as error:
+            tried.append(f"following the gait from no hip width and no offset: {error}")
+    if section_map.value("alternating_offset") != 0.0:
+        for slope in _HELPING_SLOPES:
+            try:
+                return _pumped(section_map, slope, exact)
+            except NoGaitError as error:
+                tried.append(f"following the gait from slope {slope:g} without pumping: {error}")
+    raise NoGaitError(
+        f"no gait found for {section_map.walker.parameters} with inter-leg angle "
+        f"{section_map.inter_leg_angle:g} and mass offset {_shown(section_map.mass_offset)}; "
+        "tried: " + "; ".join(tried)
+    )
+
+
+def _shown(offsets: tuple[float, float]) -> str:
+    left, right = offsets
+    return f"{left:g}" if left == right else f"({left:g}, {right:g})"
+
+
+def _planar_guess(section_map: ActiveMap) -> Vector | None:
+    heading, offset = 0.0, section_map.value("mass_offset")
+    parameters = section_map.walker.parameters
+    if offset != 0.0 and not parameters.slope_turns:
+        sine = -offset / math.tan(parameters.slope or math.inf)
+        if not abs(sine) < 1.0:
+            return None
+        heading = math.asin(sine)
+    rate = planar_gait_rate(section_map.walker, section_map.inter_leg_angle, heading)
+    if math.isnan(rate):
+        return None
+    return np.array([heading, 0.5 * section_map.inter_leg_angle, 0.0, rate, 0.0])
+
+
+def _from_planar(section_map: ActiveMap, guess: Vector, exact: bool) -> Vector:
+    """Solve at once; a gait past a fold only counts where none on the planar gait's side can be followed."""
+    state = solve_fixed_point(section_map, guess, exact=exact)
+    if not exact:
+        return state
+    path, planar = _widening(section_map)
+    side = side_of_folds(path(0.0), planar)
+    if side_of_folds(section_map, state) == side:
+        return state
+    try:
+        return follow_fixed_point(path, planar, side=side)[1]
+    except NoGaitError:
+        return state
+
+
+def _widened(section_map: ActiveMap, exact: bool) -> Vector:
+    path, planar = _widening(section_map)
+    return follow_fixed_point(path, planar, exact=exact)[1]
+
+
+def _widening(section_map: ActiveMap) -> tuple[Callable[[float], ActiveMap], Vector]:
+    """The path on which hip width and offsets grow together from zero, and the planar gait there."""
+    width = section_map.value("hip_width")
+
+    def path(share: float) -> ActiveMap:
+        return _with_offsets(section_map.moved("hip_width", share * width), share)
+
+    planar = _planar_guess(path(0.0))
+    if planar is None:
+        raise NoGaitError("the slope gives no energy")
+    return path, planar
+
+
+def _pumped(section_map: ActiveMap, slope: float, exact: bool) -> Vector:
+    """From a slope that drives the gait alone: raise the offsets from zero as the slope becomes the map's own."""
+    target = section_map.value("slope")
+
+    def path(share: float) -> ActiveMap:
+        return _with_offsets(section_map.moved("slope", slope + share * (target - slope)), share)
+
+    start = search_active(path(0.0), exact=exact)
+    return follow_fixed_point(path, start, exact=exact)[1]
+
+
+def _with_offsets(section_map: ActiveMap, share: float) -> ActiveMap:
+    """The map at a share of its offsets."""
+    left, right = section_map.mass_offset
+    return replace(section_map, mass_offset=(share * left, share * right))

@@ -1,0 +1,296 @@
+"""A walker and its controller as one dynamical system: the section map of both together.
+
+The state is all that the next step depends on: the section state, the mass offset in force, and what else an observation shows. Derivatives
+are the exact ones of the walking step, composed with differences of the controller's commands: a learned policy computes in single
+precision, in which a difference over a small step is noise. So multipliers come with bounds of their errors.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lean_yaw_env.analysis.active_map import cycle_step, has_downhill, moved_walker, step_rows
+from lean_yaw_env.analysis.fixed_point import solve_fixed_point
+from lean_yaw_env.analysis.many_walks import walk_many
+from lean_yaw_env.analysis.section_map import (
+    BODY_PARAMETERS,
+    FEET_IN_TURN,
+    MOTIONS,
+    CycleStep,
+    Linearised,
+    Motion,
+    SectionMap,
+)
+from lean_yaw_env.analysis.slopes import Slopes, slopes_of
+from lean_yaw_env.analysis.stride import differentiate_step
+from lean_yaw_env.errors import NoGaitError
+from lean_yaw_env.kernel.jacobian import OUTPUTS
+from lean_yaw_env.kernel.records import STEPPED, Command, Outcome
+from lean_yaw_env.parameters import MIRROR, STATE_FIELDS, STATE_SIZE, Foot, Vector, require_state
+from lean_yaw_env.validation import require_array, require_choice, require_count
+from lean_yaw_env.walker import Walker, require_completed
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+OFFSET, MEMORY = STATE_SIZE, STATE_SIZE + 1
+"""Where a state holds the mass offset in force, and the first coordinate of what else it remembers."""
+SETTLING_STEPS = 400
+"""Walked from the start before Newton's method takes over; even, to end on the left foot."""
+
+_TINY = 1e-30
+_STATUS = Outcome._fields.index("status")
+_OFFSET_OUT = Outcome._fields.index("mass_offset")
+
+Predict = Callable[[NDArray[np.float32]], ArrayLike]
+"""A controller: from observations (n, m) to actions (n, 2). It answers the same observation always the same."""
+
+
+class ControlInterface(Protocol):
+    """What stands between a walker and its controller: what is observed, what an action commands, and what is remembered.
+
+    ``n`` walkers stand on the same foot; a state has ``k`` coordinates: the section state, the mass offset in force, and the remembered ones.
+
+    Attributes
+    ----------
+    remembered : by name, the motion that each coordinate belongs to which a step leaves behind, beside section state and offset
+    headings : names of the coordinates that make no difference where every heading is like any other
+    scales : shape (k,)
+        What an observation shows as a change of about one.
+    reach : shape (2,)
+        How far inter-leg angle and mass offset go.
+    """
+
+    remembered: Mapping[str, Motion]
+    headings: tuple[str, ...]
+    scales: Vector
+    reach: Vector
+
+    def observe(self, states: Vector, foot: Foot) -> NDArray[np.float32]:
+        """Observations (n, m) of states (n, k)."""
+        ...
+
+    def command(self, states: Vector, foot: Foot, actions: NDArray[np.float32]) -> Vector:
+        """Inter-leg angles and mass offsets (n, 2), in space, that actions (n, 2) in these states mean."""
+        ...
+
+    def remember(self, states: Vector, outputs: Mapping[str, Vector]) -> Vector:
+        """What steps leave behind, (n, len(remembered)).
+
+        ``outputs`` holds arrays (n,) by the names of ``kernel.jacobian.OUTPUTS``. Both may be complex numbers, which carry derivatives.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class ClosedLoopMap(SectionMap):
+    """Steps of a walker that a controller steers.
+
+    Attributes
+    ----------
+    walker : Walker
+    interface : ControlInterface
+    predict : from observations (n, m) to actions (n, 2)
+    start : shape (k,)
+        A state on the left foot to walk from, where the gait is looked for.
+    n_steps : even int
+    """
+
+    walker: Walker
+    interface: ControlInterface
+    predict: Predict
+    start: Vector
+    n_steps: int = 2
+
+    precision = 1e-6  # actions are rounded to some 1e-8
+    neutral_within = 1e-5
+    zero_explanation = (
+        "section, or memory: two legs at a fixed angle with both feet on the floor determine the stance pitch from the ankle angle, and what is "
+        "left of an earlier offset or footprint is gone after the cycle"
+    )
+
+    def __post_init__(self) -> None:
+        if require_count("n_steps", self.n_steps, 2) % 2:
+            raise ValueError(f"n_steps must be even, got {self.n_steps}")
+        object.__setattr__(self, "start", self.require_state(self.start))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (
+            *(each.name for each in STATE_FIELDS), "mass_offset", *self.interface.remembered
+        )  # fmt: skip
+
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        known = {**MOTIONS, **self.interface.remembered}
+        return tuple(known[name] for name in self.names)
+
+    @property
+    def free(self) -> list[int]:
+        alike = () if has_downhill(self.walker.parameters) else self.interface.headings
+        return [k for k, name in enumerate(self.names) if name not in alike]
+
+    @property
+    def mirror(self) -> Vector:
+        raise ValueError("a closed loop's steps have no mirror image: n_steps must be even")
+
+    @property
+    def stander(self) -> Walker:
+        return self.walker
+
+    def require_state(self, state: ArrayLike) -> Vector:
+        array = require_array("state", state, (len(self.names),))
+        require_state(array[:STATE_SIZE])
+        return array
+
+    def results(self, state: Vector) -> list[CycleStep]:
+        steps: list[CycleStep] = []
+        for k in range(self.n_steps):
+            foot = FEET_IN_TURN[k % 2]
+            command = self._command(state, self.commands(state[None], foot)[0])
+            result = require_completed(
+                self.walker.step(
+                    state[:STATE_SIZE],
+                    stance=foot,
+                    inter_leg_angle=command[0],
+                    mass_offset=command[1],
+                    previous_offset=command[2],
+                ),
+                f"step {k + 1}",
+            )
+            values = (
+                *result.state, result.duration, *result.displacement, result.mass_offset, result.energy.shift_work
+            )  # fmt: skip
+            outputs = {name: np.array([v]) for name, v in zip(OUTPUTS, values, strict=True)}
+            left = self.interface.remember(state[None], outputs)[0]
+            after = np.concatenate([result.state, [result.mass_offset], left])
+            steps.append(cycle_step(state, after, foot, command, result))
+            state = after
+        return steps
+
+    def commands(self, states: Vector, foot: Foot) -> Vector:
+        """Inter-leg angles and mass offsets (n, 2) that the controller commands in states (n, k).
+
+        Raises
+        ------
+        ValueError
+            If it answers with anything but finite numbers.
+        """
+        seen = self.interface.observe(states, foot)
+        actions = np.asarray(self.predict(seen))
+        require_array("predict's actions", actions, (len(states), 2))
+        return self.interface.command(states, foot, actions)
+
+    def slopes(self, state: Vector, foot: Foot) -> Slopes:
+        """The commands in a state with their derivatives by it."""
+        return slopes_of(
+            lambda states: self.commands(states, foot), state, self.interface.scales, self.interface.reach
+        )  # fmt: skip
+
+    def linear_step(self, state: Vector, k: int, parameter: str | None) -> Linearised:
+        foot = FEET_IN_TURN[k % 2]
+        asked = self.slopes(state, foot)
+        command = self._command(state, asked.values)
+        step = differentiate_step(
+            self.walker, state[:STATE_SIZE], foot, command, with_body=parameter is not None
+        )
+        # by the state, the two commands and the parameter
+        size = len(state)
+        wide = np.zeros((len(OUTPUTS), size + 3))
+        wide[:, :STATE_SIZE] = step.jacobian[:, :STATE_SIZE]
+        wide[:, OFFSET] = step.jacobian[:, STATE_SIZE + 2]
+        wide[:, size : size + 2] = step.jacobian[:, STATE_SIZE : STATE_SIZE + 2]
+        if parameter is not None:
+            index = BODY_PARAMETERS.index(require_choice("parameter", parameter, self.parameters))
+            wide[:, size + 2] = step.jacobian[:, STATE_SIZE + 3 + index]
+        image, found = self._after(state, step.outputs, wide)
+        by_command = found[:, size : size + 2]
+        return Linearised(
+            image,
+            found[:, :size] + by_command @ asked.slopes,
+            found[:, size + 2],
+            np.abs(by_command) @ asked.errors,
+        )
+
+    def _after(self, state: Vector, outputs: Vector, wide: Vector) -> tuple[Vector, Vector]:
+        """The state after a step with outputs (10,), and its derivatives (k, m) from those of the outputs (10, m)."""
+        n = wide.shape[1]
+        before = state + 1j * _TINY * np.eye(n, len(state))
+        named = dict(zip(OUTPUTS, outputs[:, None] + 1j * _TINY * wide, strict=True))
+        left = self.interface.remember(before, named)
+        moved = np.column_stack([*(named[each.name] for each in STATE_FIELDS), named["mass_offset"], left])
+        return moved[0].real.copy(), moved.imag.T / _TINY
+
+    def step_many(self, states: Vector, carried: Vector, foot: int) -> tuple[Vector, Vector, Vector]:
+        asked = self.commands(states, FEET_IN_TURN[foot])
+        rows = step_rows(
+            self._bodies, np.column_stack([asked, states[:, OFFSET]]), states[:, :STATE_SIZE], foot
+        )
+        after = states.copy()
+        after[:, :STATE_SIZE], after[:, OFFSET] = rows[:, :STATE_SIZE], rows[:, _OFFSET_OUT]
+        done = rows[:, _STATUS] == STEPPED
+        named = {name: rows[done, Outcome._fields.index(name)] for name in OUTPUTS}
+        after[done, MEMORY:] = self.interface.remember(states[done], named)
+        return after, carried, rows[:, _STATUS]
+
+    def search(self) -> Iterator[Vector]:
+        """The gait that the controller keeps, stable or not: by walking from the start, and then by Newton's method."""
+        tried: list[str] = []
+        walk = walk_many(self, self.start[None], SETTLING_STEPS).require_solved()
+        starts = {"the start": self.start}
+        if walk.survived[0]:
+            starts = {"where the walk settles": walk.states[0], **starts}
+        else:
+            tried.append("the walk falls")
+        for name, start in starts.items():
+            try:
+                found = solve_fixed_point(self, start)
+            except NoGaitError as error:
+                tried.append(f"from {name}: {error}")
+                continue
+            yield found
+            return
+        raise NoGaitError(
+            f"no gait of walker and controller repeats every {self.n_steps} steps; tried: "
+            + "; ".join(tried)
+        )
+
+    def value(self, parameter: str) -> float:
+        require_choice("parameter", parameter, self.parameters)
+        return getattr(self.walker.parameters, parameter)
+
+    def moved(self, parameter: str, value: float) -> Self:
+        """The same controller on another body; what it observes and commands stays as it is."""
+        require_choice("parameter", parameter, self.parameters)
+        return replace(self, walker=moved_walker(self.walker, parameter, value))
+
+    def over(self, n_steps: int) -> Self:
+        return replace(self, n_steps=n_steps)
+
+    def question(self) -> dict[str, Any]:
+        return {
+            "walker": "ClosedLoopMap",
+            "parameters": asdict(self.walker.parameters),
+            "controller": self._fingerprint,
+        }
+
+    @cached_property
+    def _bodies(self) -> Vector:
+        return np.array([self.walker.parameters.body()])
+
+    @cached_property
+    def _fingerprint(self) -> str:
+        """A digest of what the controller commands in some states around the start, which tells controllers apart."""
+        places = np.random.default_rng(0).uniform(-1.0, 1.0, (64, len(self.start)))
+        asked = self.commands(self.start + 0.3 * places * self.interface.scales, "left")
+        return hashlib.sha256(asked.tobytes()).hexdigest()
+
+    def _command(self, state: Vector, asked: Vector) -> Command:
+        return Command(float(asked[0]), float(asked[1]), float(state[OFFSET]))

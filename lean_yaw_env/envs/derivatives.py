@@ -1,0 +1,200 @@
+"""Exact derivatives of an environment's step, through the same formulas by which it moves, pays and observes.
+
+Complex numbers carry them: an imaginary part of 1e-30 on one input gives imaginary parts 1e-30 times the derivatives, to round-off and
+without a difference of nearby numbers. The walking step's own come from ``kernel.jacobian``.
+
+Inputs are what a step's result depends on: the walker's ``FOLLOWED`` fields before the step, the task's fields of which ``is_followed`` is
+set, then what is commanded (``COMMANDED``). Outputs are the followed fields after the step, the observation, the reward, the duration.
+
+``differentiate`` is a template, as ``judging.judge`` is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from lean_yaw_env.envs.dynamics import move
+from lean_yaw_env.envs.judging import no_refresh
+from lean_yaw_env.envs.observation import (
+    ANKLE_RATE,
+    COMMON_CENTRES,
+    COMMON_ODD,
+    COMMON_SCALES,
+    OBSERVATION_LIMIT,
+    PITCH_RATE,
+    STANCE_FOOT,
+    common_values,
+    mirror_sign,
+)
+from lean_yaw_env.envs.state import WALKER_FIELDS, Field, complex_type
+from lean_yaw_env.kernel.compilation import borrowed, formula, written_formula
+from lean_yaw_env.kernel.records import STEPPED, Outcome
+from lean_yaw_env.parameters import STATE_FIELDS
+
+FOLLOWED = (*(field.name for field in STATE_FIELDS), "mass_offset", "place_x", "place_z")
+COMMANDED = ("inter_leg_angle", "commanded_offset", "effort")
+TINY = 1e-30
+# Of the walking step's inputs (``kernel.jacobian``): the state, the inter-leg angle, the offset, the offset before.
+_OFFSET_BEFORE, _ANGLE, _OFFSET = 7, 5, 6
+_FELL = 1
+
+
+def followed_fields(fields: Sequence[Field]) -> tuple[str, ...]:
+    """Names of the fields of a task's record that derivatives lead through."""
+    return tuple(field.name for field in fields if field.is_followed)
+
+
+def differentiation_tables(fields: Sequence[Field]) -> dict[str, Any]:
+    """What ``differentiate`` takes of a task's fields: formulas that copy, seed and read records."""
+    own = followed_fields(fields)
+    seeds = [("walker", name) for name in FOLLOWED] + [("task", name) for name in own]
+    seeds += [("walker", name) for name in COMMANDED]
+    kernel = [*range(5), _OFFSET_BEFORE, -1, -1, *(-1 for _ in own), _ANGLE, _OFFSET, -1]
+    return {
+        "COPY_WALKER": _copy(WALKER_FIELDS),
+        "COPY_TASK": _copy(fields),
+        "SEED": written_formula(
+            "seed",
+            ("walker", "task", "k"),
+            [
+                f"if k == {k}: {record}.{name} = complex({record}.{name}.real, {TINY})"
+                for k, (record, name) in enumerate(seeds)
+            ],
+        ),
+        "READ": written_formula(
+            "read",
+            ("column", "walker", "task"),
+            [
+                f"column[{k}] = {record}.{name}.imag / {TINY}"
+                for k, (record, name) in enumerate(seeds[: len(FOLLOWED) + len(own)])
+            ],
+        ),
+        "KERNEL_INPUTS": tuple(kernel),
+        "FOLLOWED_SIZE": len(FOLLOWED) + len(own),
+        "WALKER_TYPE": complex_type(WALKER_FIELDS),
+        "TASK_TYPE": complex_type(fields),
+    }
+
+
+def _copy(fields: Sequence[Field]) -> Any:
+    """The formula ``copy(target, source)`` of a record with these fields."""
+    places = [
+        place
+        for field in fields
+        for place in (
+            [field.name] if field.size == 1 else [f"{field.name}[{k}]" for k in range(field.size)]
+        )
+    ]
+    lines = [f"target.{place} = source.{place}" for place in places]
+    return written_formula("copy", ("target", "source"), lines or ["pass"])
+
+
+TASK_REWARD: Any = None
+TASK_REFRESH: Any = no_refresh
+TASK_FEATURES: Any = None
+CENTRES, SCALES, ODD = COMMON_CENTRES, COMMON_SCALES, COMMON_ODD
+COPY_WALKER: Any = None
+COPY_TASK: Any = None
+SEED: Any = None
+READ: Any = None
+KERNEL_INPUTS: tuple[int, ...] = ()
+FOLLOWED_SIZE = len(FOLLOWED)
+WALKER_TYPE: Any = None
+TASK_TYPE: Any = None
+
+
+@formula
+def carrying(value: Any, steps: Any, row: int, column: int) -> Any:
+    """A walking step's output with its derivative by one input, of which ``column`` is -1 if the step does not see it."""
+    return complex(value, TINY * steps[row, column] if column >= 0 else 0.0)
+
+
+@formula
+def step_outcome(before: Any, after: Any, steps: Any, column: int) -> Any:
+    """The completed step's outcome, with derivatives by one input. ``steps`` holds the rows of ``kernel.jacobian.OUTPUTS``."""
+    return Outcome(
+        carrying(after.heading, steps, 0, column),
+        carrying(after.stance_pitch, steps, 1, column),
+        carrying(after.ankle_angle, steps, 2, column),
+        carrying(after.stance_pitch_rate - after.pitch_push, steps, 3, column),
+        carrying(after.ankle_rate - after.ankle_push, steps, 4, column),
+        STEPPED,
+        carrying(after.duration, steps, 5, column),
+        carrying(after.place_x - before.place_x, steps, 6, column),
+        carrying(after.place_z - before.place_z, steps, 7, column),
+        0.0,
+        carrying(after.mass_offset, steps, 8, column),
+        0.0,
+        0.0,
+        0.0,
+        carrying(after.shift_work, steps, 9, column),
+        0.0,
+        0.0,
+        0.0,
+    )
+
+
+def read_observation(column, walker, task, settings):
+    """Write the observation's derivatives below those of the followed fields; return the row after them."""
+    row = FOLLOWED_SIZE
+    sign = mirror_sign(walker, settings)
+    values = common_values(walker, settings) + TASK_FEATURES(walker, task)
+    for k in range(len(values)):
+        if k == STANCE_FOOT and settings.mirror != 0:
+            continue
+        value = sign * values[k] if ODD[k] else values[k]
+        shown = (value - CENTRES[k]) / SCALES[k]
+        is_rate = k == PITCH_RATE or k == ANKLE_RATE
+        hides = abs(shown.real) > OBSERVATION_LIMIT or (is_rate and settings.hidden_rates != 0)
+        column[row] = 0.0 if hides else shown.imag / TINY
+        row += 1
+    return row
+
+
+def differentiate(
+    befores, tasks_before, walkers, tasks, settings, steps, jacobians, first, last
+):
+    """Write the derivatives of the last step of walkers ``first`` to ``last`` - 1; of one that fell, zeros.
+
+    Parameters
+    ----------
+    befores, tasks_before : records (n,), before the step
+    walkers, tasks : records (n,), after it
+    settings : records (1,)
+    steps : (n, outputs, inputs), of the walking step: ``kernel.jacobian``
+    jacobians : (n, followed + observation + 2, followed + 3), written
+    """
+    befores, tasks_before, walkers = borrowed(befores), borrowed(tasks_before), borrowed(walkers)
+    tasks, settings, steps = borrowed(tasks), borrowed(settings), borrowed(steps)
+    jacobians = borrowed(jacobians)
+    common = settings[0]
+    own_walker, own_task = np.empty(1, WALKER_TYPE), np.empty(1, TASK_TYPE)
+    walker, task = own_walker[0], own_task[0]
+    for i in range(first, last):
+        if walkers[i].fall != 0:
+            for row in range(jacobians.shape[1]):
+                for k in range(jacobians.shape[2]):
+                    jacobians[i, row, k] = 0.0
+            continue
+        for k in range(len(KERNEL_INPUTS)):
+            COPY_WALKER(walker, befores[i])
+            COPY_TASK(task, tasks_before[i])
+            walker.inter_leg_angle = walkers[i].inter_leg_angle
+            walker.commanded_offset = walkers[i].commanded_offset
+            walker.effort = walkers[i].effort
+            SEED(walker, task, k)
+            move(walker, step_outcome(befores[i], walkers[i], steps[i], KERNEL_INPUTS[k]))
+            walker.stance_pitch_rate += walkers[i].pitch_push
+            walker.ankle_rate += walkers[i].ankle_push
+            column = jacobians[i, :, k]
+            reward = TASK_REWARD(walker, task)
+            # what the task asks next is drawn, and no derivative leads through a draw
+            COPY_TASK(task, tasks[i])
+            TASK_REFRESH(walker, task)
+            READ(column, walker, task)
+            row = read_observation(column, walker, task, common)
+            column[row] = reward.imag / TINY
+            column[row + 1] = walker.duration.imag / TINY

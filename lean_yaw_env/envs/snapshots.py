@@ -1,0 +1,98 @@
+"""The state of an environment as arrays: all that its next step depends on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lean_yaw_env.envs.simulation import Simulation
+from lean_yaw_env.envs.state import Records
+
+State = dict[str, NDArray[Any]]
+"""Arrays by name; ``walkers`` and ``tasks`` are records with named fields."""
+
+_ARRAYS = ("walkers", "tasks", "bodies", "observations")
+_WORDS = 6  # of 64 bits, that a PCG64 generator's state takes
+_WORD = 2**64
+
+
+def state_of(simulation: Simulation, generators: list[np.random.Generator]) -> State:
+    """Copies of all that the walkers' next steps depend on."""
+    return {
+        **{name: getattr(simulation, name).copy() for name in _ARRAYS},
+        "generators": np.array([_words_of(each) for each in generators], dtype=np.uint64),
+    }
+
+
+def restore(simulation: Simulation, state: State) -> list[np.random.Generator]:
+    """Bring a simulation to a state and return its generators.
+
+    Raises
+    ------
+    ValueError
+        If it is a state of other walkers, or holds what is not a number; nothing has changed then.
+    """
+    own = {name: getattr(simulation, name) for name in _ARRAYS}
+    forms = {name: (array.shape, array.dtype) for name, array in own.items()}
+    forms["generators"] = ((simulation.n, _WORDS), np.dtype(np.uint64))
+    for name, (shape, kind) in forms.items():
+        given = state.get(name)
+        if given is None or given.shape != shape or given.dtype != kind:
+            found = "nothing" if given is None else f"shape {given.shape} of {given.dtype}"
+            raise ValueError(f"state must hold {name!r} in shape {shape} of {kind}, got {found}")
+    for name in ("walkers", "tasks"):
+        _require_numbers(name, state[name])
+    for name, array in own.items():
+        array[:] = state[name]
+    return [_generator_of(words) for words in state["generators"]]
+
+
+def plain(state: State) -> dict[str, NDArray[Any]]:
+    """The same with records as rows of 64-bit words (n, fields), for files that know no records."""
+    return {
+        name: array.view(np.uint64).reshape(len(array), -1) if array.dtype.names else array
+        for name, array in state.items()
+    }
+
+
+def from_plain(simulation: Simulation, arrays: dict[str, NDArray[Any]]) -> State:
+    """A state of this simulation from its ``plain`` arrays, or ``ValueError``."""
+    state = dict(arrays)
+    for name in ("walkers", "tasks"):
+        kind = getattr(simulation, name).dtype
+        words = arrays.get(name)
+        if words is None or words.ndim != 2 or 8 * words.shape[1] != kind.itemsize:
+            raise ValueError(f"snapshot must hold {name!r} in rows of {kind.itemsize // 8} words")
+        state[name] = np.ascontiguousarray(words, dtype=np.uint64).view(kind)[:, 0]
+    return state
+
+
+def _require_numbers(name: str, records: Records) -> None:
+    for field in records.dtype.names or ():
+        values = records[field]
+        if values.dtype.kind == "f" and not np.isfinite(values).all():
+            raise ValueError(f"state must hold finite numbers, got {name}[{field!r}] = {values}")
+
+
+def _words_of(generator: np.random.Generator) -> list[int]:
+    """The state of a PCG64 generator, as Gymnasium seeds them, in words of 64 bits."""
+    state = generator.bit_generator.state
+    if state["bit_generator"] != "PCG64":
+        raise ValueError(f"np_random must be a PCG64 generator, got {state['bit_generator']}")
+    words = [part for key in ("state", "inc") for part in divmod(state["state"][key], _WORD)]
+    return [*words, state["has_uint32"], state["uinteger"]]
+
+
+def _generator_of(words: NDArray[np.uint64]) -> np.random.Generator:
+    """The generator that ``_words_of`` tells the state of."""
+    high, low, high_increment, low_increment, has_uint32, uinteger = (int(word) for word in words)
+    bits = np.random.PCG64()
+    bits.state = {
+        "bit_generator": "PCG64",
+        "state": {"state": high * _WORD + low, "inc": high_increment * _WORD + low_increment},
+        "has_uint32": has_uint32,
+        "uinteger": uinteger,
+    }
+    return np.random.Generator(bits)
