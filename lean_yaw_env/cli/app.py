@@ -179,6 +179,29 @@ def _vehicle(record: rows.Record) -> Output:
 
 
 @command()
+def view(
+    walk: Annotated[
+        Path | None, typer.Option(help="Show this walk, saved with Walk.save.")
+    ] = None,
+    port: Annotated[int, typer.Option(help="Of this machine; 0 takes a free one.")] = 0,
+    browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
+) -> Output:
+    """Show the walkers in the browser, computed there by the package's own kernel; served to this machine only."""
+    from lean_yaw_env.viewer import view as view_page
+
+    server = view_page(walk, port=port, open_browser=browser)
+
+    def serve() -> None:
+        typer.echo(f"the page is at {server.address} until Ctrl-C")
+        try:
+            server.wait()
+        except KeyboardInterrupt:
+            server.close()
+
+    return Output({"address": server.address}, serve)
+
+
+@command()
 def reproduce(
     names: Annotated[
         list[str],

@@ -150,9 +150,7 @@ def _scaled(downhill: Vector, right: Vector) -> Vector:
 
 def _goal_space(observation: Any) -> Any:
     goal = spaces.Box(-GOAL_LIMIT, GOAL_LIMIT, (2,), np.float64)
-    return spaces.Dict(
-        {"observation": observation, "achieved_goal": goal, "desired_goal": goal}
-    )
+    return spaces.Dict({"observation": observation, "achieved_goal": goal, "desired_goal": goal})
 
 
 def _unmirrored(options: Mapping[str, Any]) -> dict[str, Any]:
