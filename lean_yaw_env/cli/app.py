@@ -6,7 +6,7 @@ import math
 import sys
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -52,14 +52,11 @@ def gait(
     ] = 0.0,
 ) -> Output:
     """Find a walker's limit cycle and print it with its multipliers; the defaults are Table 1's."""
-    from lean_yaw_env.analysis import find_limit_cycle, section_map_of
+    from lean_yaw_env.analysis import find_limit_cycle
 
-    offsets: dict[str, Any] = {
-        "inter_leg_angle": inter_leg_angle,
-        "mass_offset": (mass_offset + alternating_offset, mass_offset - alternating_offset),
-    }
-    cycle = find_limit_cycle(walker, **offsets)
-    record = rows.gait_record(cycle, section_map_of(walker, **offsets).names)
+    offsets = mass_offset + alternating_offset, mass_offset - alternating_offset
+    cycle = find_limit_cycle(walker, inter_leg_angle=inter_leg_angle, mass_offset=offsets)
+    record = rows.gait_record(cycle)
     return Output(record, lambda: screen.show_gait(record))
 
 
