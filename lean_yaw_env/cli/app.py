@@ -52,8 +52,7 @@ def gait(
     ] = 0.0,
 ) -> Output:
     """Find a walker's limit cycle and print it with its multipliers; the defaults are Table 1's."""
-    from lean_yaw_env.analysis import find_limit_cycle
-    from lean_yaw_env.analysis import section_map_of
+    from lean_yaw_env.analysis import find_limit_cycle, section_map_of
 
     offsets: dict[str, Any] = {
         "inter_leg_angle": inter_leg_angle,
