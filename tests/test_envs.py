@@ -483,7 +483,9 @@ def test_keys_cover_what_can_be_held_and_steer_to_their_side() -> None:
         WalkerEnv("Walk").get_keys_to_action()
 
 
-@pytest.mark.parametrize("name", ["TimeAwareObservation", "NumpyToTorch", "RecordEpisodeStatistics"])
+@pytest.mark.parametrize(
+    "name", ["TimeAwareObservation", "NumpyToTorch", "RecordEpisodeStatistics"]
+)
 def test_gymnasium_s_wrappers_take_it(name: str) -> None:
     if name == "NumpyToTorch":
         pytest.importorskip("array_api_compat")

@@ -22,6 +22,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
 from lean_yaw_env.kernel import fusing
+from lean_yaw_env.kernel.notice import NOTICE
 
 # A division by zero gives inf or nan as in C: Python's exception would be a branch, and a branch stops vectorisation.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy"}
@@ -172,6 +173,7 @@ def entry_point(
         dispatcher = _njit(nogil=True, **_OPTIONS, **options)(function)
         if not hasattr(dispatcher, "enable_caching"):  # NUMBA_DISABLE_JIT=1 leaves a plain function
             return dispatcher
+        NOTICE.watch(dispatcher)
         try:
             dispatcher.enable_caching()
         except RuntimeError:
