@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from lean_yaw_env.analysis.section_map import RESIDUAL_LIMIT
 from lean_yaw_env.kernel.batch import step_batch
-from lean_yaw_env.kernel.jacobian import INPUTS
-from lean_yaw_env.kernel.jacobians import step_jacobians
+from lean_yaw_env.kernel.jacobian import step_jacobians
 from lean_yaw_env.kernel.records import STEPPED, Body, Outcome
 from lean_yaw_env.parameters import MIRROR, QUARTER_TURN, STATE_SIZE, Vector
 from lean_yaw_env.threads import share_out
@@ -108,7 +107,7 @@ class WalkerGrid:
         """States (n, 5) after a step, its Jacobians (n, 5, 5), and whether it was completed (n,)."""
         n = self.n
         statuses, afters = np.empty(n), np.empty((n, STATE_SIZE))
-        rows = np.empty((n, STATE_SIZE, INPUTS))
+        rows = np.empty((n, STATE_SIZE, STATE_SIZE))
         commands, sides = self.commands(foot), np.full(n, 1.0 - 2.0 * foot)
         states = np.ascontiguousarray(states)
         share_out(
@@ -118,7 +117,7 @@ class WalkerGrid:
             n,
             self.threads,
         )
-        return afters, rows[:, :, :STATE_SIZE].copy(), statuses == STEPPED
+        return afters, rows, statuses == STEPPED
 
     def residual(self, states: Vector) -> tuple[Vector, Flags]:
         """Change (n, 5) over a mirrored step of symmetric walkers, over a stride of others, and whether it was completed (n,).

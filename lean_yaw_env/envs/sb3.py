@@ -34,6 +34,7 @@ class WalkerVecEnv(VecEnv):
     step_info : bool
         Fill every walker's info at every step, which costs far more than the step itself.
     threads : int >= 1
+    render_mode : None or "rgb_array"
     **options
         See ``EnvOptions``.
 
@@ -50,6 +51,7 @@ class WalkerVecEnv(VecEnv):
         *,
         step_info: bool = False,
         threads: int = 1,
+        render_mode: str | None = None,
         **options: Any,
     ) -> None:
         self.walkers = WalkerVectorEnv(
@@ -58,6 +60,7 @@ class WalkerVecEnv(VecEnv):
             autoreset_mode=AutoresetMode.SAME_STEP,
             step_info=step_info,
             threads=threads,
+            render_mode=render_mode,
             **options,
         )
         self.walkers._tells_episodes = True
@@ -134,8 +137,8 @@ class WalkerVecEnv(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
-        """Many walkers draw no pictures."""
-        return [None for _ in range(self.num_envs)]
+        """A picture of each walker, if the environment is made with ``render_mode="rgb_array"``; SB3 puts them side by side."""
+        return self.walkers.render() or [None for _ in range(self.num_envs)]
 
     def step_durations(self) -> NDArray[np.float64]:
         """How long each walker's last step took in simulated time, shape (num_envs,); 0 where it ended an episode."""
