@@ -35,11 +35,11 @@ class Algorithm:
 
     Attributes
     ----------
-    settings : class of its settings
+    settings : class of its settings, a ``LearnerSettings``
     make : its learner's class
     """
 
-    settings: type[LearnerSettings]
+    settings: type[Any]
     make: MakeLearner
 
 
