@@ -256,6 +256,10 @@ export class WalkExhibit implements Exhibit {
     return settings;
   }
 
+  get isMoving(): boolean {
+    return this.arrow.isShown;
+  }
+
   timeScale(): number {
     return 1 / units.timeUnit();
   }
