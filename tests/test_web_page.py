@@ -42,11 +42,15 @@ class Visit:
     """A page that has been opened, with what it complained of and asked for."""
 
     def __init__(self, browser, address, **context):
-        self.context = browser.new_context(**{"viewport": {"width": 1280, "height": 800}, **context})
+        self.context = browser.new_context(
+            **{"viewport": {"width": 1280, "height": 800}, **context}
+        )
         self.context.set_default_timeout(PATIENCE)
         self.page = self.context.new_page()
         self.complaints, self.requests = [], []
-        self.page.on("console", lambda m: m.type in ("error", "warning") and self.complaints.append(m.text))
+        self.page.on(
+            "console", lambda m: m.type in ("error", "warning") and self.complaints.append(m.text)
+        )
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.goto(address)
@@ -65,14 +69,18 @@ class Visit:
         """Move a slider as a hand does: to the nearest of its marks. Returns where it stands."""
         slider = self.page.locator(f"#{name}")
         slider.evaluate(
-            "(input, value) => { input.value = value; input.dispatchEvent(new Event('input')); }", value
+            "(input, value) => { input.value = value; input.dispatchEvent(new Event('input')); }",
+            value,
         )
         return float(slider.input_value())
 
     def multipliers(self):
         rows = self.page.locator(".modes tbody tr[data-re]").all()
         return np.array(
-            [complex(float(r.get_attribute("data-re")), float(r.get_attribute("data-im"))) for r in rows]
+            [
+                complex(float(r.get_attribute("data-re")), float(r.get_attribute("data-im")))
+                for r in rows
+            ]
         )
 
     def close(self):
@@ -178,7 +186,9 @@ def test_sliders_show_the_packages_multipliers(visit, changes):
         "speed => Math.abs(leanYaw.active().cycle?.speed - speed) < 1e-9", arg=expected.speed
     )
     assert_same_multipliers(page.multipliers(), expected.eigenvalues)
-    shown = page.look("({ state: leanYaw.active().cycle.state, step: leanYaw.active().cycle.stepLength })")
+    shown = page.look(
+        "({ state: leanYaw.active().cycle.state, step: leanYaw.active().cycle.stepLength })"
+    )
     assert np.abs(np.array(shown["state"]) - expected.state).max() < SAME
     assert abs(shown["step"] - expected.step_length) < SAME
     verdict = "stable" if expected.is_stable else "unstable"
@@ -196,7 +206,9 @@ def test_sliders_show_the_packages_multipliers(visit, changes):
 def test_passive_walkers_have_the_packages_multipliers(visit, tab, parameters, planar):
     settings = "&".join(f"{name}={value}" for name, value in parameters.items())
     page = visit(f"tab={tab}&{settings}")
-    expected = find_limit_cycle(PassiveWalker(WalkerParameters(hip_width=0.0, **parameters), planar=planar))
+    expected = find_limit_cycle(
+        PassiveWalker(WalkerParameters(hip_width=0.0, **parameters), planar=planar)
+    )
     page.page.wait_for_selector(".modes tbody tr[data-re]")
     assert_same_multipliers(page.multipliers(), expected.eigenvalues)
     assert abs(page.look("leanYaw.active().cycle.stridePeriod") - expected.stride_period) < SAME
@@ -289,7 +301,11 @@ def test_link_restores_every_slider_and_the_units(visit, address):
     for name, value in wanted.items():
         assert float(other.page.locator(f"#steered-{name}").input_value()) == value
     assert other.page.locator("#units-system").input_value() == "moon"
-    assert other.look("[leanYaw.units.si, leanYaw.units.leg, leanYaw.units.gravity]") == [True, 0.8, 1.62]
+    assert other.look("[leanYaw.units.si, leanYaw.units.leg, leanYaw.units.gravity]") == [
+        True,
+        0.8,
+        1.62,
+    ]
     assert "m/s" in other.page.locator(".facts").first.inner_text()
 
 
@@ -358,5 +374,42 @@ def test_frame_times_are_measured_in_the_page(visit, capsys):
     eight = page.look("leanYaw.frames.summary()")
     with capsys.disabled():
         for name, times in (("one walker", one), ("eight", eight)):
-            print(f"\n{name}: {times['work']:.2f} ms of script a frame, {times['between']:.0f} ms between frames")
+            print(
+                f"\n{name}: {times['work']:.2f} ms of script a frame, {times['between']:.0f} ms between frames"
+            )
     assert one["frames"] > 0 and eight["work"] > 0.0
+
+
+def test_saved_walk_is_walked_on_the_page_with_the_same_bits(browser, tmp_path):
+    # a body and commands of its own, and a fall at the end
+    parameters = WalkerParameters(hip_width=0.25, shift_time=0.2, friction_limit=0.9)
+    offsets = np.where(np.arange(60) < 6, 0.01, 0.2)
+    walk = Walker(parameters).walk(
+        60, state=[0.0, 0.155, -0.004, -0.42, -0.07], mass_offset=offsets
+    )
+    assert walk.fall is not None
+    walk.save(tmp_path / "walk.json")
+    with PageServer(tmp_path / "walk.json") as server:
+        visit = Visit(browser, f"{server.address}&{COARSE}")
+        visit.press("p")
+        visit.press(".", walk.n_steps + 2)
+        records = visit.look(
+            "leanYaw.active().walk.records.map(r => [...r.state, r.duration, ...r.contact])"
+        )
+        fall = visit.look("leanYaw.active().walk.current.fall.name")
+        visit.close()
+    records = np.array(records)
+    assert np.array_equal(records[:, :5], walk.states)
+    assert np.array_equal(records[:-1, 5], walk.durations)
+    assert np.array_equal(records[:, 6:], walk.footprints)
+    assert fall == walk.fall.value
+
+
+def test_file_that_is_no_walk_is_refused_in_words(visit, tmp_path):
+    page = visit()
+    (tmp_path / "other.json").write_text('{"format": "something else"}')
+    page.page.locator("summary", has_text="Take it with you").click()
+    page.page.locator("#share-file").set_input_files(tmp_path / "other.json")
+    page.page.wait_for_function(
+        "document.querySelector('#share-status').textContent.includes('not a walk')"
+    )

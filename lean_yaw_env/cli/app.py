@@ -89,8 +89,7 @@ def gait(
     as_json: AsJson = False,
 ) -> None:
     """Find a walker's limit cycle and print it with its multipliers; the defaults are Table 1's."""
-    from lean_yaw_env.analysis import find_limit_cycle
-    from lean_yaw_env.analysis import section_map_of
+    from lean_yaw_env.analysis import find_limit_cycle, section_map_of
 
     walker = walker_of(hip_width, foot_radius, ankle_tilt, slope, passive=passive, planar=planar)
     command: dict[str, Any] = {
@@ -243,9 +242,7 @@ def skateboard(
 @app.command()
 @reporting_errors
 def view(
-    walk: Annotated[
-        Path | None, typer.Option(help="Show this walk, saved with Walk.save.")
-    ] = None,
+    walk: Annotated[Path | None, typer.Option(help="Show this walk, saved with Walk.save.")] = None,
     port: Annotated[int, typer.Option(help="Of this machine; 0 takes a free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
 ) -> None:
