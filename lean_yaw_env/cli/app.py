@@ -180,9 +180,7 @@ def _vehicle(record: rows.Record) -> Output:
 
 @command()
 def view(
-    walk: Annotated[
-        Path | None, typer.Option(help="Show this walk, saved with Walk.save.")
-    ] = None,
+    walk: Annotated[Path | None, typer.Option(help="Show this walk, saved with Walk.save.")] = None,
     port: Annotated[int, typer.Option(help="Of this machine; 0 takes a free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
 ) -> Output:
