@@ -68,6 +68,31 @@ def test_the_linear_step_is_the_limit_of_small_differences(walker, gait):
         assert np.allclose(step.by_input[:, column], (ahead - back) / (2.0 * small), atol=2e-6)
 
 
+@pytest.mark.parametrize("offsets", [(0.0, 0.0), (0.02, -0.015)])
+def test_the_speed_s_derivatives_are_the_limit_of_small_differences(walker, gait, offsets):
+    start, (before, change) = gait + 0.2 * np.eye(5)[0], offsets
+    exact = linearise_step(walker, start, 0.3, before + change, before).speed
+
+    def speed(point):
+        step = walker.step(
+            point[:5],
+            previous_offset=point[5],
+            inter_leg_angle=point[6],
+            mass_offset=point[5] + point[7],
+        )
+        heading = 0.5 * (point[0] + step.state[0])
+        along = step.displacement @ [math.cos(heading), -math.sin(heading)]
+        return along / step.duration
+
+    middle, small = np.array([*start, before, 0.3, change]), 1e-6
+    differences = [
+        (speed(middle + nudge) - speed(middle - nudge)) / (2.0 * small)
+        for nudge in small * np.eye(8)
+    ]
+    # small^2 times the third derivative, and round-off of 1e-13 / small
+    assert exact == pytest.approx(differences, abs=1e-7)
+
+
 @pytest.mark.parametrize("heading", [0.0, 0.3, -0.6])
 def test_feedback_pulls_all_eigenvalues_of_the_stride_inside_those_of_the_open_loop(
     walker, heading

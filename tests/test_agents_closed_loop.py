@@ -224,7 +224,8 @@ def test_modes_are_named_by_what_takes_part():
 
 def test_pushes_are_those_that_the_agent_survives():
     few, many = (
-        largest_pushes(find_limit_cycle(loop), directions=4, n_steps=40) for loop in (FIXED, FEEDBACK)
+        largest_pushes(find_limit_cycle(loop), directions=4, n_steps=40)
+        for loop in (FIXED, FEEDBACK)
     )
     assert few.is_limited.all() and many.is_limited.all()
     assert not np.allclose(few.sizes, many.sizes, atol=10 * few.tolerance)

@@ -31,10 +31,21 @@ from agents.evaluation.leaderboard import (
 from agents.evaluation.plan import Candidate, Evaluation, run_all
 from agents.evaluation.results import RETURN, SURVIVAL, Episodes, Results, is_share
 from agents.evaluation.scoring import run_episodes
-from agents.registry import AGENTS, KINDS, AgentRequest, make_agent, make_all, names_for
+from agents.registry import (
+    AGENTS,
+    KINDS,
+    AgentRequest,
+    agent_colour,
+    make_agent,
+    make_all,
+    names_for,
+)
+from lean_yaw_env import Walker
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.registration import ENV_IDS, TASK_VERSIONS
+from lean_yaw_env.rendering.palette import AGENT_COLOURS
 
 SHORT = EnvOptions(horizon=8.0)
 EPISODES = 6
@@ -239,6 +250,31 @@ def test_a_recorded_episode_keeps_goals_and_path():
     assert slalom.reference_path is not None and slalom.reference_path.shape[1] == 2
     assert not slalom.goals
     assert record_episode(RandomController(0), "Walk", seed=1, most_steps=5).reference_path is None
+
+
+def test_a_random_body_s_path_is_walked_by_that_body():
+    options = EnvOptions(random_body="training", start_disturbance=0.0)
+    episode = record_episode(FixedController(), "Walk", seed=3, options=options, most_steps=6)
+    assert episode.body != EnvOptions().walker_parameters(task_named("Walk"))
+    walker = Walker(episode.body)
+    # the path in a step ends where that body's own step takes it: at the time of the next heel strike
+    env = WalkerEnv("Walk", **vars(options))
+    _, info = env.reset(seed=3)
+    ends = []
+    for _ in range(6):
+        step = walker.step(info["state"], stance="left" if info["stance_side"] > 0.0 else "right")
+        _, _, _, _, after = env.step(np.zeros(2, dtype=np.float32))
+        assert after["state"] == pytest.approx(step.state, abs=1e-12)
+        ends.append(info["time"] + step.duration)
+        info = after
+    times = episode.path[:, 0]
+    assert times[-1] == pytest.approx(ends[-1], abs=1e-12)
+    assert all(np.abs(times - end).min() < 1e-12 for end in ends)
+
+
+def test_every_agent_has_a_colour_of_its_own():
+    assert set(AGENT_COLOURS) == set(AGENTS)
+    assert len({agent_colour(name) for name in AGENTS}) == len(AGENTS)
 
 
 def test_the_leaderboard_holds_every_agent_and_the_command_that_made_it(tmp_path: Path):

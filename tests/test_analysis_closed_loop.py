@@ -121,7 +121,9 @@ def test_feedback_is_followed_to_where_it_loses_stability_which_the_multipliers_
     assert stable.any()
     for index in (0, -1):
         cycle = branch.cycle(index)
-        walk = walk_many(FEEDBACK.moved("slope", branch.values[index]), cycle.state[None] + 1e-6, 60)
+        walk = walk_many(
+            FEEDBACK.moved("slope", branch.values[index]), cycle.state[None] + 1e-6, 60
+        )
         assert walk.survived[0] or not stable[index]
 
 

@@ -71,7 +71,9 @@ def test_environments_take_the_ids_that_gymnasium_takes(kind) -> None:
     for name in ("Push", "LeanYaw/Push-v0", "lean_yaw_env:LeanYaw/Push-v0"):
         made = kind(task=name)
         assert getattr(made, "walkers", made).task.name == "Push"
-    with pytest.raises(ValueError, match=r"task must be one of .*, got 'Headin'; did you mean 'Heading'"):
+    with pytest.raises(
+        ValueError, match=r"task must be one of .*, got 'Headin'; did you mean 'Heading'"
+    ):
         kind(task="Headin")
 
 
@@ -160,7 +162,9 @@ def test_a_task_cannot_take_another_s_name_or_a_field_of_the_walker() -> None:
     task = task_named("Walk")
     with pytest.raises(ValueError, match="name must be a task's own, got 'Walk'"):
         register_task(replace(task, summary="Walk away."), "Mine/Walk-v0")
-    with pytest.raises(ValueError, match="fields must not have names of the walker's record, got time"):
+    with pytest.raises(
+        ValueError, match="fields must not have names of the walker's record, got time"
+    ):
         replace(task, fields=(Field("time", "", "of day"),))
     with pytest.raises(ValueError, match="names a field that it has not: 'pace'"):
         replace(task, metrics={"pace": Metric("pace")})

@@ -303,7 +303,10 @@ def test_slope_and_friction_replace_the_parameters() -> None:
         ({"push_level": 11.0}, r"push_level must be in \[0, 10\], got 11"),
         ({"action_delay": 1}, "action_delay must be True or False, got 1"),
         ({"hidden_rates": None}, "hidden_rates must be True or False"),
-        ({"random_body": "test"}, "random_body must be None or one of training, held-out, got 'test'"),
+        (
+            {"random_body": "test"},
+            "random_body must be None or one of training, held-out, got 'test'",
+        ),
         ({"random_body": ["training"]}, "random_body must be None"),
         ({"slope": 1.0}, r"slope must be in \[-0.5, 0.5\], got 1.0"),
         ({"friction_limit": 0.0}, r"friction_limit must be in \(0, inf\], got 0.0"),
@@ -413,9 +416,7 @@ def test_approaching_pays_and_reaching_sets_another_goal() -> None:
     env = WalkerEnv("Waypoint", start_disturbance=0.0)
     _, info = env.reset(seed=0, options={"goal": (3.0, 0.0)})
     while info["goals"] == 0.0:
-        before = (
-            info["goal_distance"]
-        )
+        before = info["goal_distance"]
         _, reward, terminated, _, info = env.step(ZERO)
         assert not terminated
         if info["goals"] == 0.0:
@@ -543,7 +544,9 @@ def test_level_is_walked_and_steered_by_pumping_alone(slope: float) -> None:
     for steering in (0.0, 0.6):
         envs = started("Level", n, slope=slope)
         for _ in range(300):  # of 0.5 to 0.55 units of time, within the horizon
-            _, _, terminated, truncated, info = envs.step(pumping(envs.simulation.observations, steering))
+            _, _, terminated, truncated, info = envs.step(
+                pumping(envs.simulation.observations, steering)
+            )
             assert not terminated.any()
             assert not truncated.any()
         errors.append(info["mean_absolute_heading_error"].mean())

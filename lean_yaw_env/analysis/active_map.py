@@ -145,7 +145,11 @@ class ActiveMap(SectionMap):
 
     def linear_step(self, state: Vector, k: int, parameter: str | None) -> Linearised:
         step = differentiate_step(
-            self.walker, state, FEET_IN_TURN[k % 2], self._command(k), with_body=parameter is not None
+            self.walker,
+            state,
+            FEET_IN_TURN[k % 2],
+            self._command(k),
+            with_body=parameter is not None,
         )
         by_parameter = np.zeros(STATE_SIZE)
         if parameter is not None:
@@ -155,7 +159,9 @@ class ActiveMap(SectionMap):
             step.state, step.by_state, by_parameter, np.zeros((STATE_SIZE, STATE_SIZE))
         )
 
-    def step_many(self, states: Vector, carried: Vector, foot: int) -> tuple[Vector, Vector, Vector]:
+    def step_many(
+        self, states: Vector, carried: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
         n = len(states)
         commands = np.column_stack(
             [np.full(n, self.inter_leg_angle), np.full(n, self.mass_offset[foot]), carried]

@@ -33,7 +33,7 @@ from lean_yaw_env.analysis.stride import differentiate_step
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.jacobian import OUTPUTS
 from lean_yaw_env.kernel.records import STEPPED, Command, Outcome
-from lean_yaw_env.parameters import MIRROR, STATE_FIELDS, STATE_SIZE, Foot, Vector, require_state
+from lean_yaw_env.parameters import STATE_FIELDS, STATE_SIZE, Foot, Vector, require_state
 from lean_yaw_env.validation import require_array, require_choice, require_count
 from lean_yaw_env.walker import Walker, require_completed
 
@@ -49,6 +49,8 @@ _TINY = 1e-30
 _STATUS = Outcome._fields.index("status")
 _OFFSET_OUT = Outcome._fields.index("mass_offset")
 
+Numbers = NDArray[Any]
+"""Real numbers, or complex ones whose imaginary parts carry a derivative."""
 Predict = Callable[[NDArray[np.float32]], ArrayLike]
 """A controller: from observations (n, m) to actions (n, 2). It answers the same observation always the same."""
 
@@ -81,7 +83,7 @@ class ControlInterface(Protocol):
         """Inter-leg angles and mass offsets (n, 2), in space, that actions (n, 2) in these states mean."""
         ...
 
-    def remember(self, states: Vector, outputs: Mapping[str, Vector]) -> Vector:
+    def remember(self, states: Numbers, outputs: Mapping[str, Numbers]) -> Numbers:
         """What steps leave behind, (n, len(remembered)).
 
         ``outputs`` holds arrays (n,) by the names of ``kernel.jacobian.OUTPUTS``. Both may be complex numbers, which carry derivatives.
@@ -129,7 +131,7 @@ class ClosedLoopMap(SectionMap):
 
     @property
     def motions(self) -> tuple[Motion, ...]:
-        known = {**MOTIONS, **self.interface.remembered}
+        known: dict[str, Motion] = {**MOTIONS, **self.interface.remembered}
         return tuple(known[name] for name in self.names)
 
     @property
@@ -223,12 +225,18 @@ class ClosedLoopMap(SectionMap):
         """The state after a step with outputs (10,), and its derivatives (k, m) from those of the outputs (10, m)."""
         n = wide.shape[1]
         before = state + 1j * _TINY * np.eye(n, len(state))
-        named = dict(zip(OUTPUTS, outputs[:, None] + 1j * _TINY * wide, strict=True))
+        named: dict[str, Numbers] = dict(
+            zip(OUTPUTS, outputs[:, None] + 1j * _TINY * wide, strict=True)
+        )
         left = self.interface.remember(before, named)
-        moved = np.column_stack([*(named[each.name] for each in STATE_FIELDS), named["mass_offset"], left])
-        return moved[0].real.copy(), moved.imag.T / _TINY
+        moved = np.column_stack(
+            [*(named[each.name] for each in STATE_FIELDS), named["mass_offset"], left]
+        )
+        return np.real(moved[0]).copy(), np.imag(moved).T / _TINY
 
-    def step_many(self, states: Vector, carried: Vector, foot: int) -> tuple[Vector, Vector, Vector]:
+    def step_many(
+        self, states: Vector, carried: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
         asked = self.commands(states, FEET_IN_TURN[foot])
         rows = step_rows(
             self._bodies, np.column_stack([asked, states[:, OFFSET]]), states[:, :STATE_SIZE], foot

@@ -97,9 +97,7 @@ class WalkerGrid:
         commands, sides = self.commands(foot), np.full(n, 1.0 - 2.0 * foot)
         states = np.ascontiguousarray(states)
         share_out(
-            lambda first, last: step_batch(
-                self.bodies, commands, states, sides, rows, first, last
-            ),
+            lambda first, last: step_batch(self.bodies, commands, states, sides, rows, first, last),
             n,
             self.threads,
         )
@@ -301,7 +299,8 @@ def _size(changes: Vector) -> Vector:
 
 
 def _is_sane(states: Vector) -> Flags:
-    return np.isfinite(states).all(axis=1) & (np.abs(states[:, 1:3]) < QUARTER_TURN).all(axis=1)
+    is_upright = np.abs(states[:, 1:3]) < QUARTER_TURN
+    return np.isfinite(states).all(axis=1) & np.all(is_upright, axis=1)
 
 
 def _described(grid: WalkerGrid, search: _Search, found: Flags) -> GridGaits:

@@ -131,7 +131,9 @@ class PassiveMap(SectionMap):
             by_parameter = rows[:, size + BODY_PARAMETERS.index(parameter)]
         return Linearised(after, rows[:, :size], by_parameter, np.zeros((size, size)))
 
-    def step_many(self, states: Vector, carried: Vector, foot: int) -> tuple[Vector, Vector, Vector]:
+    def step_many(
+        self, states: Vector, carried: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
         sides = np.full(len(states), 1.0 - 2.0 * foot)
         rows = step_passive_rows(self.walker, states, sides, carried)
         return rows[:, :PASSIVE_STATE_SIZE], rows[:, _ANGLE], rows[:, _STATUS]

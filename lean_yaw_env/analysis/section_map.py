@@ -112,6 +112,12 @@ class SectionMap(ABC):
     ----------
     n_steps : int
         How many steps the map takes.
+    names : tuple of str
+        Of the state's coordinates.
+    mirror : shape (k,)
+        Signs that turn a state into its mirror image on the other foot.
+    carried : float
+        What the first step finds of an earlier one beside the state; ``step_many`` hands it on.
     precision : float
         The largest change of a coordinate over the map that still counts as a fixed point.
     neutral_within : float
@@ -123,15 +129,13 @@ class SectionMap(ABC):
     """
 
     n_steps: int
+    names: tuple[str, ...]
+    mirror: Vector
+    carried: float = 0.0
     precision: ClassVar[float] = RESIDUAL_LIMIT
     neutral_within: ClassVar[float] = 0.0
     parameters: ClassVar[tuple[str, ...]] = BODY_PARAMETERS
     zero_explanation: ClassVar[str] = ""
-
-    @property
-    @abstractmethod
-    def names(self) -> tuple[str, ...]:
-        """Names of the state's coordinates."""
 
     @property
     def motions(self) -> tuple[Motion, ...]:
@@ -142,11 +146,6 @@ class SectionMap(ABC):
     @abstractmethod
     def free(self) -> list[int]:
         """Indices of the coordinates that a gait repeats."""
-
-    @property
-    @abstractmethod
-    def mirror(self) -> Vector:
-        """Signs (k,) that turn a state into its mirror image on the other foot."""
 
     @property
     @abstractmethod
@@ -181,13 +180,10 @@ class SectionMap(ABC):
             As ``results``.
         """
 
-    @property
-    def carried(self) -> float:
-        """What the first step finds of an earlier one beside the state; ``step_many`` hands it on."""
-        return 0.0
-
     @abstractmethod
-    def step_many(self, states: Vector, carried: Vector, foot: int) -> tuple[Vector, Vector, Vector]:
+    def step_many(
+        self, states: Vector, carried: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
         """One step of n walkers on the left (0) or right (1) foot.
 
         Parameters

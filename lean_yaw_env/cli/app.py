@@ -52,8 +52,7 @@ def gait(
     ] = 0.0,
 ) -> Output:
     """Find a walker's limit cycle and print it with its multipliers; the defaults are Table 1's."""
-    from lean_yaw_env.analysis import find_limit_cycle
-    from lean_yaw_env.analysis import section_map_of
+    from lean_yaw_env.analysis import find_limit_cycle, section_map_of
 
     offsets: dict[str, Any] = {
         "inter_leg_angle": inter_leg_angle,
@@ -180,6 +179,29 @@ def _vehicle(record: rows.Record) -> Output:
         screen.show_records("eigenvalues, 1/s", record["eigenvalues"])
 
     return Output(record, show)
+
+
+@command()
+def view(
+    walk: Annotated[
+        Path | None, typer.Option(help="Show this walk, saved with Walk.save.")
+    ] = None,
+    port: Annotated[int, typer.Option(help="Of this machine; 0 takes a free one.")] = 0,
+    browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
+) -> Output:
+    """Show the walkers in the browser, computed there by the package's own kernel; served to this machine only."""
+    from lean_yaw_env.viewer import view as view_page
+
+    server = view_page(walk, port=port, open_browser=browser)
+
+    def serve() -> None:
+        typer.echo(f"the page is at {server.address} until Ctrl-C")
+        try:
+            server.wait()
+        except KeyboardInterrupt:
+            server.close()
+
+    return Output({"address": server.address}, serve)
 
 
 @command()

@@ -19,7 +19,6 @@ from lean_yaw_env.kernel.compilation import written_formula
 from lean_yaw_env.parameters import STATE_FIELDS, STATE_SIZE, Vector
 from lean_yaw_env.walker import FALL_OF_STATUS
 
-
 Flags = NDArray[np.bool_]
 
 
@@ -55,9 +54,7 @@ class Info(NamedTuple):
 
 
 STATE_MEANING = "section state (5,), not mirrored, after the push if there is one"
-FOOTPRINT_MEANING = (
-    "contact reference point of the stance foot (2,): downhill, right, from the start, in leg lengths"
-)
+FOOTPRINT_MEANING = "contact reference point of the stance foot (2,): downhill, right, from the start, in leg lengths"
 _ARRAYS = (*(f"walker.{field.name}" for field in STATE_FIELDS), "walker.place_x", "walker.place_z")
 _FOOTPRINT = slice(STATE_SIZE, STATE_SIZE + 2)
 _FIRST_NUMBER = STATE_SIZE + 2
@@ -179,9 +176,7 @@ class InfoMaker:
         info["fall"] = fall
         return info
 
-    def many(
-        self, table: Vector, falls: NDArray[np.int64], mask: Flags
-    ) -> dict[str, Any]:
+    def many(self, table: Vector, falls: NDArray[np.int64], mask: Flags) -> dict[str, Any]:
         """The infos of a vector environment, views of its table (n, size), each key beside its mask."""
         info: dict[str, Any] = dict.fromkeys(self._masks, mask)
         info.update(zip(self._names, table.T[self._columns], strict=False))

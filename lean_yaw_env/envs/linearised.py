@@ -69,9 +69,7 @@ class LinearisedSteps:
         found = np.zeros((simulation.n, len(self.outputs), len(self.inputs)))
 
         def share(first: int, last: int) -> None:
-            step_jacobians(
-                simulation.bodies, *given, *self._afters, self._steps, first, last
-            )
+            step_jacobians(simulation.bodies, *given, *self._afters, self._steps, first, last)
             simulation.task.differentiate(
                 before, tasks_before, walkers, simulation.tasks, simulation.settings,
                 self._steps, found, first, last,

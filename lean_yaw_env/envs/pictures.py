@@ -61,7 +61,9 @@ class Footage:
             path=np.array(self._path),
             commanded_heading=self._goal_direction() if command is None else command,
             goals=self._goals(),
-            reference_path=None if kind.reference_path is None else kind.reference_path(walker, task),
+            reference_path=None
+            if kind.reference_path is None
+            else kind.reference_path(walker, task),
             lines=status_lines(
                 step=int(walker.steps),
                 time=time,

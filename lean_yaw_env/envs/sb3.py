@@ -62,7 +62,7 @@ class WalkerVecEnv(VecEnv):
             self.walkers = WaypointGoalVectorEnv(num_envs, **arguments, **options)
         else:
             self.walkers = WalkerVectorEnv(num_envs, task, **arguments, **options)
-        self.walkers._tells_ends = True
+        self.walkers._tells_episodes = True
         space = self.walkers.single_observation_space
         super().__init__(num_envs, space, self.walkers.single_action_space)
         self._step_info = step_info
@@ -203,7 +203,4 @@ class WalkerVecEnv(VecEnv):
 
 def _of_walker(info: dict[str, Any], i: int) -> dict[str, Any]:
     """One walker's share of a vector environment's info, as a single environment gives it."""
-    return {
-        key: value[i] for key, value in info.items() if not key.startswith(("_", "final_"))
-    }
-
+    return {key: value[i] for key, value in info.items() if not key.startswith(("_", "final_"))}

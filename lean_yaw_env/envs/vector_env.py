@@ -94,7 +94,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._generators: list[np.random.Generator] | None = None
         self._ended = np.ones(self.num_envs, dtype=np.bool_)
-        self._tells_ends = step_info
+        self._tells_episodes = step_info
         self._pages = InfoPages(self.simulation.info, self.num_envs)
 
     def reset(
@@ -112,7 +112,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         mask = self._reset_mask(placement.pop("reset_mask", None))
         self.simulation.check_options(placement)
         self._seed(seed, mask)
-        infos = self.simulation.new_infos(cleared=True) if self.step_info else None
+        infos = self.simulation.new_infos(cleared=True) if self._tells_episodes else None
         self._begin(mask, infos)
         if placement:
             self.simulation.place(mask, placement, infos)
@@ -201,14 +201,15 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         """Keep what the ended episodes ended with, then begin new ones."""
         mask = self._ended.copy()
         observations = np.full(self.num_envs, None, dtype=object)
-        for i in np.flatnonzero(mask):
+        for i in np.flatnonzero(mask).tolist():
             observations[i] = self._observation(i)
         final = {"final_obs": observations, "_final_obs": mask}
-        if self._tells_ends:
+        if self._tells_episodes:
             told = self._told(self.simulation.report(mask), mask)
             final |= {"final_info": told, "_final_info": mask}
         self._begin(mask, infos)
         return final
+
     def _reset_mask(self, mask: Any) -> NDArray[np.bool_]:
         if mask is None:
             return np.ones(self.num_envs, dtype=np.bool_)

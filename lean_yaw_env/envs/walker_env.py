@@ -148,7 +148,9 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         (``envs.state.WALKER_FIELDS``, ``Task.fields``).
         """
         if not self._running:
-            raise ResetNeeded("call reset() before get_state(): the episode is over or has not begun")
+            raise ResetNeeded(
+                "call reset() before get_state(): the episode is over or has not begun"
+            )
         return state_of(self.simulation, [self.np_random])
 
     def set_state(self, state: State) -> None:

@@ -139,7 +139,9 @@ def _digest(function: Callable[..., Any], formulas: Iterable[Callable[..., Any]]
     return digest.hexdigest()
 
 
-def entry_point(formulas: Iterable[Callable[..., Any]] = (), **options: Any) -> Callable[[Callable[..., Any]], Any]:
+def entry_point(
+    formulas: Iterable[Callable[..., Any]] = (), **options: Any
+) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function that Python calls, releasing the GIL, and keep its machine code on disk.
 
     Numba renews its cache when the entry point's own file changes, but not when a formula inlined from another file does. A digest

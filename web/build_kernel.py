@@ -1,0 +1,278 @@
+"""Compile the kernel to a WebAssembly module, from Numba's own intermediate code, and write down names and numbers for the page.
+
+``python web/build_kernel.py`` needs the extra ``web`` (llvmlite's wasm32 target comes with Numba, the linker with ``ziglang``) and writes
+``src/kernel/kernel.wasm``, ``src/kernel/layout.ts`` and ``src/physics/vehicle_data.ts``. All are kept in the repository. The module
+carries a digest of the sources it was compiled from, so that a test can tell a stale one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+WEB = Path(__file__).parent
+KERNEL = WEB.parent / "lean_yaw_env" / "kernel"
+MODULE = WEB / "src" / "kernel" / "kernel.wasm"
+LAYOUT = WEB / "src" / "kernel" / "layout.ts"
+VEHICLES = WEB / "src" / "physics" / "vehicle_data.ts"
+_SECTION = "sources"  # the custom section with the digest
+
+# Code for no processor in particular, and one number at a time: WebAssembly takes what is left
+_NUMBA = {
+    "NUMBA_CPU_NAME": "generic",
+    "NUMBA_CPU_FEATURES": "",
+    "NUMBA_LOOP_VECTORIZE": "0",
+    "NUMBA_SLP_VECTORIZE": "0",
+}
+_TRIPLE = "wasm32-unknown-unknown"
+_LLVM_TYPES = {"none": "void", "float64": "double", "int32": "i32", "float64*": "ptr"}
+
+
+def sources() -> list[Path]:
+    """The files that the module is compiled from: the page's, and the kernel's that they import, directly or not."""
+    found = {WEB / "runtime.c"}
+    waiting = [WEB / "kernel_entries.py"]
+    while waiting:
+        path = waiting.pop()
+        if path in found:
+            continue
+        found.add(path)
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(
+                "lean_yaw_env.kernel"
+            ):
+                home = KERNEL.joinpath(*(node.module or "").split(".")[2:])
+                names = [home / alias.name for alias in node.names] + [home]
+                waiting += [
+                    name.with_suffix(".py") for name in names if name.with_suffix(".py").exists()
+                ]
+    return sorted(found)
+
+
+def digest_of_sources() -> str:
+    digest = hashlib.sha256()
+    for path in sources():
+        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+def digest_in(module: bytes) -> str:
+    """The digest that a module carries; empty if it has none."""
+    place = 8
+    while place < len(module):
+        kind, place = module[place], place + 1
+        size, place = _number_at(module, place)
+        end = place + size
+        if kind == 0:
+            length, place = _number_at(module, place)
+            if module[place : place + length] == _SECTION.encode():
+                return module[place + length : end].decode()
+        place = end
+    return ""
+
+
+def _number_at(module: bytes, place: int) -> tuple[int, int]:
+    """A number in LEB128 and the place after it."""
+    value, shift = 0, 0
+    while True:
+        byte = module[place]
+        value |= (byte & 0x7F) << shift
+        place, shift = place + 1, shift + 7
+        if byte < 0x80:
+            return value, place
+
+
+def _with_digest(module: bytes, digest: str) -> bytes:
+    name = _SECTION.encode()
+    content = bytes([len(name)]) + name + digest.encode()
+    assert len(content) < 0x80
+    return module + bytes([0, len(content)]) + content
+
+
+def _intermediate_codes(entries: dict[Any, Any]) -> list[tuple[str, str]]:
+    """Numba's optimised code of each entry, and the name of its function there."""
+    from numba import njit
+
+    compiled: Any = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    codes = []
+    for function, signature in entries.items():
+        print(f"compiling {function.__name__}", flush=True)
+        dispatcher = compiled(function)
+        dispatcher.compile(signature.args)
+        (only,) = dispatcher.signatures
+        codes.append(
+            (dispatcher.inspect_llvm(only), dispatcher.overloads[only].fndesc.mangled_name)
+        )
+    return codes
+
+
+def _for_wasm(code: str) -> str:
+    """The same code without what belongs to the machine it was made for, or to Python."""
+    code = re.sub(r'^target (datalayout|triple) = ".*"$', "", code, flags=re.MULTILINE)
+    code = re.sub(r"= common (local_unnamed_addr )?global", "= internal global", code)
+    # Numba counts the owners of arrays; here they live until the next call
+    code = re.sub(
+        r"^define linkonce_odr void @(NRT_\w+)\(.*?^}$",
+        r"declare void @\1(ptr)",
+        code,
+        flags=re.MULTILINE | re.DOTALL,
+    )
+    code = re.sub(r'"(target-cpu|target-features)"="[^"]*"', "", code)
+    code = re.sub(r"@llvm\.fma\.f64\b", "@fused_multiply_add", code)
+    return code
+
+
+def _exports(entries: dict[Any, Any], codes: list[tuple[str, str]]) -> str:
+    """Functions with plain arguments around Numba's, whose first two are where the result and an exception go."""
+    lines = ["declare void @forget_blocks()"]
+    for (function, signature), (_, name) in zip(entries.items(), codes, strict=True):
+        kinds = [_LLVM_TYPES[str(kind)] for kind in signature.args]
+        result = _LLVM_TYPES[str(signature.return_type)]
+        place = "ptr" if result == "void" else result
+        named = ", ".join(f"{kind} %{k}" for k, kind in enumerate(kinds))
+        lines += [
+            f'declare i32 @"{name}"(ptr, ptr, {", ".join(kinds)})',
+            f"define {result} @{function.__name__}({named}) {{",
+            f"  %result = alloca {place}",
+            "  %exception = alloca ptr",
+            "  call void @forget_blocks()",
+            f'  %status = call i32 @"{name}"(ptr %result, ptr %exception, {named})',
+        ]
+        if result == "void":
+            lines.append("  ret void")
+        else:
+            lines += [f"  %value = load {result}, ptr %result", f"  ret {result} %value"]
+        lines.append("}")
+    return "\n".join(lines)
+
+
+def _object(entries: dict[Any, Any]) -> bytes:
+    """Machine code for WebAssembly of all entries."""
+    from llvmlite import binding
+
+    binding.initialize_all_targets()
+    binding.initialize_all_asmprinters()
+    machine = binding.Target.from_triple(_TRIPLE).create_target_machine(opt=2, reloc="static")
+    target = f'target datalayout = "{machine.target_data}"\ntarget triple = "{_TRIPLE}"\n'
+    codes = _intermediate_codes(entries)
+    module = binding.parse_assembly(target + _exports(entries, codes))
+    for code, _ in codes:
+        module.link_in(binding.parse_assembly(target + _for_wasm(code)))
+    exported = {function.__name__ for function in entries}
+    for function in module.functions:
+        if not function.is_declaration and function.name not in exported:
+            function.linkage = binding.Linkage.internal
+    tuning = binding.create_pipeline_tuning_options(speed_level=2)
+    tuning.loop_vectorization = tuning.slp_vectorization = tuning.loop_unrolling = False
+    builder = binding.create_pass_builder(machine, tuning)
+    builder.getModulePassManager().run(module, builder)
+    return machine.emit_object(module)
+
+
+def _linked(code: bytes, exported: list[str]) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        (place / "kernel.o").write_bytes(code)
+        subprocess.run(
+            [
+                sys.executable, "-m", "ziglang", "build-exe", "kernel.o", str(WEB / "runtime.c"),
+                "-target", "wasm32-freestanding", "-O", "ReleaseFast", "-fno-entry", "-fstrip", "-fcompiler-rt",
+                "--stack", "65536", *(f"--export={name}" for name in exported), "--name", "linked",
+            ],
+            cwd=place,
+            check=True,
+        )  # fmt: skip
+        return (place / "linked.wasm").read_bytes()
+
+
+def build() -> bytes:
+    """Compile the module."""
+    os.environ.update(_NUMBA)
+    from kernel_entries import ENTRIES
+
+    shared = ["shared_rows", "shared_size", "fused_multiply_add"]
+    exported = [function.__name__ for function in ENTRIES] + shared
+    return _with_digest(_linked(_object(ENTRIES), exported), digest_of_sources())
+
+
+def layout() -> str:
+    """What the page must know of the module's rows, as TypeScript."""
+    import kernel_entries as entries
+
+    from lean_yaw_env.kernel import records
+
+    statuses = (
+        "STEPPED",
+        "BACKWARD",
+        "SIDEWAYS",
+        "TRIP",
+        "LIFT_OFF",
+        "SLIP",
+        "NO_STRIKE",
+        "FAILED",
+    )
+    tables: dict[str, Any] = {
+        "BODY": entries.Body._fields,
+        "COMMAND": entries.Command._fields,
+        "OUTCOME": entries.Outcome._fields,
+        "TRACE": entries.COLUMNS,
+        "OUTPUTS": entries.OUTPUTS,
+        "PASSIVE_OUTCOME": entries.PassiveOutcome._fields,
+    }
+    numbers = {
+        "INPUTS": entries.INPUTS,
+        "STATE_SIZE": entries.STATE_SIZE,
+        "PASSIVE_INPUTS": entries.PASSIVE_INPUTS,
+        "PASSIVE_STATE_SIZE": entries.PASSIVE_STATE_SIZE,
+        "PASSIVE_COLUMNS": entries.PASSIVE_COLUMNS,
+    }
+    lines = ["// Written by build_kernel.py from the kernel's records; do not edit.", ""]
+    lines += [
+        f"export const {name} = {json.dumps(list(names))} as const;"
+        for name, names in tables.items()
+    ]
+    lines += [f"export const {name} = {value};" for name, value in numbers.items()]
+    named = ", ".join(f"{name}: {getattr(records, name):g}" for name in statuses)
+    return "\n".join([*lines, f"export const STATUS = {{ {named} }} as const;", ""])
+
+
+def vehicles() -> str:
+    """The package's bicycles and skateboard as TypeScript: SI units."""
+    from lean_yaw_env.vehicles import BENCHMARK_2007, Skateboard, parameters_2005
+
+    tables = {
+        "PAPER_BICYCLE": asdict(parameters_2005()),
+        "BENCHMARK_BICYCLE": asdict(BENCHMARK_2007),
+        "SKATEBOARD": asdict(Skateboard()),
+    }
+    lines = ["// Written by build_kernel.py from lean_yaw_env.vehicles; do not edit. SI units, angles in radians.", ""]
+    lines += [f"export const {name} = {json.dumps(table, indent=2)};" for name, table in tables.items()]
+    return "\n".join([*lines, ""])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="only say whether the module is stale")
+    if parser.parse_args().check:
+        stale = digest_in(MODULE.read_bytes()) != digest_of_sources()
+        sys.exit("the module is stale: run web/build_kernel.py" if stale else 0)
+    module = build()
+    MODULE.parent.mkdir(parents=True, exist_ok=True)
+    MODULE.write_bytes(module)
+    LAYOUT.write_text(layout())
+    VEHICLES.write_text(vehicles())
+    print(f"{MODULE}: {len(module)} bytes")
+
+
+if __name__ == "__main__":
+    main()
