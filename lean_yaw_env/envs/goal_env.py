@@ -192,11 +192,7 @@ def _conditioned(simulation: Simulation) -> GoalObservation:
 def _goal_space() -> Any:
     own = spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (_SIZE,), np.float32)
     goal = spaces.Box(-GOAL_LIMIT, GOAL_LIMIT, (2,), np.float64)
-<<<<<<< HEAD
     return spaces.Dict({"observation": own, "achieved_goal": goal, "desired_goal": goal})
-=======
-    return spaces.Dict({"observation": observation, "achieved_goal": goal, "desired_goal": goal})
->>>>>>> main
 
 
 def _fell(info: Infos) -> NDArray[np.bool_]:
