@@ -25,6 +25,9 @@ GOAL_TASK = "WaypointGoal"
 GOAL_ENV_ID = f"{NAMESPACE}/{GOAL_TASK}-v0"
 """That task for goal-conditioned learners: the one environment whose observations are dictionaries."""
 
+ALL_TASKS = (*TASK_VERSIONS, GOAL_TASK)
+ALL_ENV_IDS = (*ENV_IDS, GOAL_ENV_ID)
+
 TASK_IDS: dict[str, str] = {}
 """The name of the task of each registered id."""
 

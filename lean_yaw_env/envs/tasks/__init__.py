@@ -5,16 +5,9 @@ from __future__ import annotations
 import importlib
 
 from lean_yaw_env.envs.tasks.task import Command, Feature, Formula, Metric, Task
-from lean_yaw_env.registration import (
-    GOAL_TASK,
-    TASK_IDS,
-    TASK_VERSIONS,
-    name_of_task,
-    register_id,
-)
+from lean_yaw_env.registration import ALL_TASKS, TASK_IDS, name_of_task, register_id
 from lean_yaw_env.validation import suggestion
 
-_OWN = (*TASK_VERSIONS, GOAL_TASK)
 _REGISTERED: dict[str, Task] = {}
 """Tasks of other packages, by name."""
 
@@ -32,8 +25,8 @@ def task_named(task: str | Task) -> Task:
     name = name_of_task(task)
     if name in _REGISTERED:
         return _REGISTERED[name]
-    if name not in _OWN:
-        known = (*_OWN, *_REGISTERED)
+    if name not in ALL_TASKS:
+        known = (*ALL_TASKS, *_REGISTERED)
         raise ValueError(
             f"task must be one of {', '.join(known)}, got {task!r}{suggestion(task, known)}"
         )
@@ -54,7 +47,7 @@ def register_task(task: Task, env_id: str) -> None:
     ValueError
         If another task has that name.
     """
-    if task.name in _OWN or _REGISTERED.get(task.name, task) is not task:
+    if task.name in ALL_TASKS or _REGISTERED.get(task.name, task) is not task:
         raise ValueError(f"name must be a task's own, got {task.name!r}, which there is already")
     _REGISTERED[task.name] = task
     register_id(env_id, task.name, reward_threshold=task.reward_threshold)
