@@ -31,8 +31,13 @@ Other tasks are not judged by their return."""
 
 ENV_IDS = tuple(f"{NAMESPACE}/{name}-v{version}" for name, version in TASK_VERSIONS.items())
 
-GOAL_ENV_ID = f"{NAMESPACE}/WaypointGoal-v0"
-"""Waypoint for goal-conditioned learners: the one environment whose observations are dictionaries."""
+GOAL_TASK = "WaypointGoal"
+"""Waypoint with one goal, paid for reaching it alone."""
+GOAL_ENV_ID = f"{NAMESPACE}/{GOAL_TASK}-v0"
+"""That task for goal-conditioned learners: the one environment whose observations are dictionaries."""
+
+ALL_TASKS = (*TASK_VERSIONS, GOAL_TASK)
+ALL_ENV_IDS = (*ENV_IDS, GOAL_ENV_ID)
 
 TASK_IDS: dict[str, str] = {}
 """The name of the task of each registered id."""
@@ -59,6 +64,7 @@ def register_envs() -> None:
     """Register every environment that is not registered yet; calling it again does nothing."""
     for name, env_id in zip(TASK_VERSIONS, ENV_IDS, strict=True):
         register_id(env_id, name, reward_threshold=REWARD_THRESHOLDS.get(name))
+    TASK_IDS[GOAL_ENV_ID] = GOAL_TASK
     if GOAL_ENV_ID not in registry:
         register(
             id=GOAL_ENV_ID,
