@@ -281,7 +281,7 @@ def test_the_command_line_trains_judges_and_is_found_by_the_evaluator(tmp_path):
     ("arguments", "message"),
     [
         (["--task", "Fly"], "task must be one of"),
-        (["--task", "WaypointGoal"], "observations are dictionaries"),
+        (["--task", "Walk", "--algorithm", "her"], "task of her must be"),
         (["--steps", "0"], "steps must be from"),
         (["--seed", "-1"], "seed must be from"),
         (["--episodes", "0"], "episodes must be from"),
