@@ -36,12 +36,12 @@ class Algorithm:
 
     Attributes
     ----------
-    settings : class of its settings
+    settings : class of its settings, a ``LearnerSettings``
     make : its learner's class
     tasks : that it can learn
     """
 
-    settings: type[LearnerSettings]
+    settings: type[Any]
     make: MakeLearner
     tasks: tuple[str, ...] = ALL_TASKS
 

@@ -39,6 +39,7 @@ class WalkerVecEnv(VecEnv):
     step_info : bool
         Fill every walker's info at every step, which costs far more than the step itself.
     threads : int >= 1
+    render_mode : None or "rgb_array"
     **options
         See ``EnvOptions``.
 
@@ -55,13 +56,20 @@ class WalkerVecEnv(VecEnv):
         *,
         step_info: bool = False,
         threads: int = 1,
+        render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        arguments = {"autoreset_mode": AutoresetMode.SAME_STEP, "step_info": step_info, "threads": threads}  # fmt: skip
+        arguments: dict[str, Any] = {
+            "autoreset_mode": AutoresetMode.SAME_STEP,
+            "step_info": step_info,
+            "threads": threads,
+            "render_mode": render_mode,
+            **options,
+        }
         if task == GOAL_ENV_ID:
-            self.walkers = WaypointGoalVectorEnv(num_envs, **arguments, **options)
+            self.walkers = WaypointGoalVectorEnv(num_envs, **arguments)
         else:
-            self.walkers = WalkerVectorEnv(num_envs, task, **arguments, **options)
+            self.walkers = WalkerVectorEnv(num_envs, task, **arguments)
         self.walkers._tells_episodes = True
         space = self.walkers.single_observation_space
         super().__init__(num_envs, space, self.walkers.single_action_space)
@@ -136,8 +144,8 @@ class WalkerVecEnv(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
-        """Many walkers draw no pictures."""
-        return [None for _ in range(self.num_envs)]
+        """A picture of each walker, if the environment is made with ``render_mode="rgb_array"``; SB3 puts them side by side."""
+        return self.walkers.render() or [None for _ in range(self.num_envs)]
 
     def step_durations(self) -> NDArray[np.float64]:
         """How long each walker's last step took in simulated time, shape (num_envs,); 0 where it ended an episode."""

@@ -33,7 +33,7 @@ def task_named(task: str | Task) -> Task:
     return importlib.import_module(f"{__name__}.{name.lower()}").TASK
 
 
-def register_task(task: Task, env_id: str) -> None:
+def register_task(task: Task, env_id: str, *, reward_threshold: float | None = None) -> None:
     """Make a task of your own known by its name, and to ``gymnasium.make`` and ``make_vec`` by an id.
 
     Parameters
@@ -41,6 +41,8 @@ def register_task(task: Task, env_id: str) -> None:
     task : Task
     env_id : str
         As "Mine/Zigzag-v0".
+    reward_threshold : float, optional
+        The mean return from which the task counts as solved.
 
     Raises
     ------
@@ -50,7 +52,7 @@ def register_task(task: Task, env_id: str) -> None:
     if task.name in ALL_TASKS or _REGISTERED.get(task.name, task) is not task:
         raise ValueError(f"name must be a task's own, got {task.name!r}, which there is already")
     _REGISTERED[task.name] = task
-    register_id(env_id, task.name, reward_threshold=task.reward_threshold)
+    register_id(env_id, task.name, reward_threshold=reward_threshold)
 
 
 __all__ = [
