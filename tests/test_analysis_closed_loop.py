@@ -229,7 +229,9 @@ def test_a_solvers_failure_is_raised_and_no_fall(monkeypatch) -> None:
 
 
 def test_a_failure_in_the_linear_step_is_raised_and_no_fall(monkeypatch) -> None:
-    monkeypatch.setattr("lean_yaw_env.analysis.stride.step_jacobian", lambda *arguments: FAILED)
+    monkeypatch.setattr(
+        "lean_yaw_env.analysis.stride.step_jacobian", lambda *arguments: (FAILED, None, None)
+    )
     with pytest.raises(SolverError, match="did not converge"):
         FEEDBACK.linearise(FEEDBACK.start)
 

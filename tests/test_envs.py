@@ -12,6 +12,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+import torch
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import RecordVideo
@@ -462,6 +463,39 @@ def test_an_environment_without_pictures_says_how_to_get_them() -> None:
         assert env.render() is None
     with pytest.raises(ResetNeeded, match="reset"):
         WalkerEnv("Walk", render_mode="rgb_array").render()
+
+
+def test_keys_cover_what_can_be_held_and_steer_to_their_side() -> None:
+    env = WalkerEnv("Walk", mirror=False, start_disturbance=0.0)
+    keys = env.get_keys_to_action()
+    assert len(keys) == 2**4  # every way to hold four keys, none among them
+    assert all(env.action_space.contains(action) for action in keys.values())
+    assert (keys[""] == 0.0).all()
+    ends = {}
+    for key in ("a", "d", "w", "s"):
+        env.reset(seed=0, options={"stance": "left"})
+        for _ in range(30):
+            *_, info = env.step(keys[key])
+        ends[key] = info
+    assert ends["a"]["footprint"][1] < 0.0 < ends["d"]["footprint"][1]
+    assert ends["w"]["speed"] > ends["s"]["speed"]
+    with pytest.raises(ValueError, match="mirror must be False"):
+        WalkerEnv("Walk").get_keys_to_action()
+
+
+@pytest.mark.parametrize(
+    "name", ["TimeAwareObservation", "NumpyToTorch", "RecordEpisodeStatistics"]
+)
+def test_gymnasium_s_wrappers_take_it(name: str) -> None:
+    if name == "NumpyToTorch":
+        pytest.importorskip("array_api_compat")
+    env = getattr(gym.wrappers, name)(gym.make("LeanYaw/Push-v0", max_episode_steps=5))
+    env.reset(seed=1)
+    zero = env.unwrapped.action_space.sample() * 0
+    if name == "NumpyToTorch":
+        zero = torch.from_numpy(zero)
+    ends = [tuple(env.step(zero)[2:4]) for _ in range(5)]
+    assert ends[-1] == (False, True)
 
 
 # --- bad input

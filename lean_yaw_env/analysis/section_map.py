@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import singledispatch
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
@@ -21,6 +21,8 @@ from numpy.typing import ArrayLike
 from lean_yaw_env.analysis.stride import require_offsets
 from lean_yaw_env.kernel.records import Command
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector
+from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.validation import require_choice
 from lean_yaw_env.walker import Walker
 
 if TYPE_CHECKING:
@@ -106,10 +108,11 @@ class Linearised(NamedTuple):
 class SectionMap(ABC):
     """A walker's map of the heel-strike section onto itself; states have ``k`` coordinates.
 
-    A subclass gives the walking step (``results``, ``step_many``, ``linear_step``) and says what its states are.
+    A subclass is a frozen dataclass. It gives the walking step (``results``, ``step_many``, ``linear_step``), says what its states are and where its gaits are looked for.
 
     Attributes
     ----------
+    walker : Walker or PassiveWalker
     n_steps : int
         How many steps the map takes.
     names : tuple of str
@@ -128,6 +131,7 @@ class SectionMap(ABC):
         Why the map has a multiplier of zero.
     """
 
+    walker: Walker | PassiveWalker
     n_steps: int
     names: tuple[str, ...]
     mirror: Vector
@@ -148,9 +152,9 @@ class SectionMap(ABC):
         """Indices of the coordinates that a gait repeats."""
 
     @property
-    @abstractmethod
     def stander(self) -> Walker:
         """The walker whose stance phase a step of the map has."""
+        return Walker(self.walker.parameters)
 
     @abstractmethod
     def require_state(self, state: ArrayLike) -> Vector:
@@ -207,25 +211,31 @@ class SectionMap(ABC):
             If there is none; says what was tried.
         """
 
-    @abstractmethod
     def value(self, parameter: str) -> float:
         """A parameter's value, or ``ValueError`` for an unknown one."""
+        require_choice("parameter", parameter, self.parameters)
+        return getattr(self.walker.parameters, parameter)
 
-    @abstractmethod
     def moved(self, parameter: str, value: float) -> Self:
         """The same map at another value of a parameter."""
+        require_choice("parameter", parameter, self.parameters)
+        changed = replace(self.walker.parameters, **{parameter: value})
+        return self._with(walker=replace(self.walker, parameters=changed))
 
-    @abstractmethod
     def over(self, n_steps: int) -> Self:
         """The same walker's map over another number of steps."""
+        return self._with(n_steps=n_steps)
+
+    def _with(self, **changes: Any) -> Self:
+        return replace(self, **changes)  # pyright: ignore[reportArgumentType]  # every map is a dataclass
 
     def along(self, parameter: str) -> Self:
         """The map over as many steps as its gaits repeat in at every value of a parameter."""
         return self
 
-    @abstractmethod
     def question(self) -> dict[str, Any]:
         """What identifies the map in a stored result, as plain values."""
+        return {"map": type(self).__name__, "parameters": asdict(self.walker.parameters)}
 
     def image(self, state: Vector) -> Vector:
         """The state after ``n_steps``, mirrored if they are odd."""

@@ -8,10 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lean_yaw_env.errors import FellError
-from lean_yaw_env.kernel.jacobian import INPUTS, OUTPUTS, step_jacobian
+from lean_yaw_env.kernel.jacobian import INPUTS, step_jacobian
 from lean_yaw_env.kernel.records import Command
-from lean_yaw_env.kernel.sensitivity import INPUTS as ALL_INPUTS
-from lean_yaw_env.kernel.sensitivity import step_sensitivity
 from lean_yaw_env.parameters import (
     INTER_LEG_ANGLE,
     STATE_SIZE,
@@ -122,12 +120,8 @@ def differentiate_step(
     """
     start = require_state(state)
     body = walker.parameters.body()
-    outputs = np.empty(len(OUTPUTS))
-    rows = np.empty((len(OUTPUTS), ALL_INPUTS if with_body else INPUTS))
-    if with_body:
-        status = step_sensitivity(body, command, start, SIDE[stance], outputs, rows)
-    else:
-        status = step_jacobian(body, command, *start.tolist(), SIDE[stance], outputs, rows)
+    inputs = len(INPUTS) if with_body else STATE_SIZE + len(command)
+    status, outputs, rows = step_jacobian(body, command, start, SIDE[stance], inputs)
     raise_for_failure(status, start, walker.parameters)
     if status in FALL_OF_STATUS:
         raise FellError(
