@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from lean_yaw_env.envs.transition import OFFSET_SCALE, STATE_CENTRES, STATE_SCALES
 from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.envs.transition import OFFSET_SCALE, STATE_CENTRES, STATE_SCALES
 from lean_yaw_env.parameters import STATE_FIELDS
 
 _CENTRES = dict(zip((field.name for field in STATE_FIELDS), STATE_CENTRES, strict=True))

@@ -8,6 +8,13 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import solve_discrete_are
+from typer.testing import CliRunner
+
+from agents import FixedController, HeadingFeedback, HeadingGains, RandomController
+from agents.evaluation.closed_loop import app, examine, write_report
 from agents.evaluation.closed_loop_gait import (
     ZERO,
     find_closed_loop_gait,
@@ -15,6 +22,7 @@ from agents.evaluation.closed_loop_gait import (
     stride_jacobian,
 )
 from agents.evaluation.closed_loop_map import ClosedLoop
+from agents.evaluation.closed_loop_report import LINES, csv_text, plain
 from agents.evaluation.closed_loop_survival import (
     REACHES,
     SURVIVED,
@@ -24,14 +32,6 @@ from agents.evaluation.closed_loop_survival import (
     pushed,
     walk_on,
 )
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from scipy.linalg import solve_discrete_are
-from typer.testing import CliRunner
-
-from agents import FixedController, HeadingFeedback, HeadingGains, RandomController
-from agents.evaluation.closed_loop import app, examine, write_report
-from agents.evaluation.closed_loop_report import LINES, csv_text, plain
 from agents.observations import ObservationLayout
 from lean_yaw_env import Walker, WalkerParameters
 from lean_yaw_env.analysis import find_limit_cycle

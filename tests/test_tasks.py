@@ -14,12 +14,6 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from lean_yaw_env.envs.transition import (
-    ANKLE_PUSH,
-    BODY_DEVIATIONS,
-    HELD_OUT_REACH,
-    PITCH_PUSH,
-)
 
 import lean_yaw_env  # noqa: F401  registers the environments
 from lean_yaw_env import Walker, WalkerParameters, find_limit_cycle
@@ -27,6 +21,12 @@ from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.describe import INFO_MEANINGS, OPTIONAL_INFO_MEANINGS, renewed
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import slalom, speedheading, task_named, waypoint
+from lean_yaw_env.envs.transition import (
+    ANKLE_PUSH,
+    BODY_DEVIATIONS,
+    HELD_OUT_REACH,
+    PITCH_PUSH,
+)
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.registration import ENV_IDS, TASK_VERSIONS

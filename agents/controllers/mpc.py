@@ -10,11 +10,11 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 import numpy as np
-from lean_yaw_env.envs.rows import WalkerRows
 from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
+from lean_yaw_env.envs.rows import WalkerRows
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.validation import require_number

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from lean_yaw_env.envs.rows import WalkerRows
 from numpy.typing import NDArray
 
 from agents.agent import Agent
 from agents.controllers.mpc_settings import MpcSettings
 from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.options import ACTION_SIZE
+from lean_yaw_env.envs.rows import WalkerRows
 from lean_yaw_env.kernel.records import FAILED
 from lean_yaw_env.parameters import Vector
 

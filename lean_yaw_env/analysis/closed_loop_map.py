@@ -33,7 +33,7 @@ from lean_yaw_env.analysis.stride import differentiate_step
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.jacobian import OUTPUTS
 from lean_yaw_env.kernel.records import STEPPED, Command, Outcome
-from lean_yaw_env.parameters import STATE_FIELDS, STATE_SIZE, Foot, Vector, require_state
+from lean_yaw_env.parameters import MIRROR, STATE_FIELDS, STATE_SIZE, Foot, Vector, require_state
 from lean_yaw_env.validation import require_array, require_choice, require_count
 from lean_yaw_env.walker import Walker, require_completed
 

@@ -7,12 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
-from lean_yaw_env.envs.transition import (
-    OBSERVATION_LIMIT,
-    OFFSET_SCALE,
-    STATE_CENTRES,
-    STATE_SCALES,
-)
 from numpy.typing import NDArray
 from torch import Tensor
 
@@ -22,6 +16,12 @@ from agents.learning.gradient.tasks import StepTaken, formulas_of
 from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.sb3 import WalkerVecEnv
+from lean_yaw_env.envs.transition import (
+    OBSERVATION_LIMIT,
+    OFFSET_SCALE,
+    STATE_CENTRES,
+    STATE_SCALES,
+)
 from lean_yaw_env.kernel.jacobian import INPUTS, OUTPUTS
 from lean_yaw_env.kernel.jacobians import step_jacobians
 from lean_yaw_env.kernel.records import Outcome
