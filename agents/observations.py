@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lean_yaw_env.envs.observation import COMMON_CENTRES, COMMON_NAMES, COMMON_SCALES
+from lean_yaw_env.envs.goal_env import seen_from_walker
+from lean_yaw_env.envs.observation import (
+    COMMON_CENTRES,
+    COMMON_NAMES,
+    COMMON_SCALES,
+    STANCE_FOOT,
+)
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 
@@ -49,8 +56,12 @@ class ObservationLayout:
             tuple(scales[name] for name in names),
         )
 
-    def require(self, observation: ArrayLike) -> NDArray[np.float32]:
-        """The observation as an array of shape (..., features), or ``ValueError``."""
+    def require(self, observation: ArrayLike | Mapping[str, Any]) -> NDArray[np.float32]:
+        """The observation as an array of shape (..., features), or ``ValueError``; that of ``WaypointGoalEnv`` as seen from the walker."""
+        if isinstance(observation, Mapping):
+            observation = seen_from_walker(
+                observation, mirror=COMMON_NAMES[STANCE_FOOT] not in self.names
+            )
         array = np.asarray(observation, dtype=np.float32)
         if array.ndim == 0 or array.shape[-1] != len(self.names):
             raise ValueError(

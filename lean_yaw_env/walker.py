@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from enum import Enum
 from functools import cached_property
 from typing import NamedTuple
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.errors import FellError, SolverError
+from lean_yaw_env.files import require_ending, write_json
 from lean_yaw_env.kernel import records
 from lean_yaw_env.kernel.records import Body, Command, Outcome
 from lean_yaw_env.kernel.step import step as step_kernel
@@ -130,11 +132,15 @@ class Walk:
     durations : shape (n,)
     mass_offsets : shape (n + 1,)
         Offsets in force at each heel strike.
+    commands : shape (m, 2)
+        Inter-leg angle and mass offset commanded for each step begun: ``n``, or one more after a fall.
     energies : n ledgers
     path : shape (m, 4)
         Time, and the centre of mass downhill, up and right, sampled within the steps; empty unless asked for.
     fall : Fall or None
         How the walk ended, if not by its number of steps.
+    parameters : WalkerParameters
+        Of the walker.
     """
 
     states: Vector
@@ -142,9 +148,11 @@ class Walk:
     footprints: Vector
     durations: Vector
     mass_offsets: Vector
+    commands: Vector
     energies: tuple[EnergyLedger, ...]
     path: Vector
     fall: Fall | None
+    parameters: WalkerParameters
 
     @property
     def headings(self) -> Vector:
@@ -159,6 +167,29 @@ class Walk:
     def distance(self) -> float:
         """Straight-line distance between the first and the last footprint, in leg lengths."""
         return float(np.linalg.norm(self.footprints[-1] - self.footprints[0]))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the walk to a .json file that the web page opens: ``lean-yaw view --walk FILE``.
+
+        The file holds every step's start and command; the page computes the motion within the steps anew, with the same bits.
+
+        Raises
+        ------
+        ValueError
+            If the path has another ending, or its folder does not exist.
+        """
+        place = require_ending(path, (".json",))
+        saved = {
+            "format": "lean-yaw-walk",
+            "version": 1,
+            "parameters": asdict(self.parameters),
+            "stances": self.stances,
+            "states": self.states.tolist(),
+            "inter_leg_angles": self.commands[:, 0].tolist(),
+            "commanded_offsets": self.commands[:, 1].tolist(),
+            "mass_offsets": self.mass_offsets.tolist(),
+        }
+        write_json(place, saved)
 
 
 @dataclass(frozen=True)
@@ -273,9 +304,11 @@ class Walker:
             footprints=np.array(footprints),
             durations=np.array(durations),
             mass_offsets=np.array(in_force),
+            commands=np.array(commands[: len(durations) + (fall is not None)])[:, :2],
             energies=tuple(energies),
             path=np.concatenate(path) if path else np.empty((0, 4)),
             fall=fall,
+            parameters=self.parameters,
         )
 
     def stance_motion(

@@ -25,9 +25,9 @@ from agents.controllers.schedule import GainSchedule, LqrWeights, last_turn, per
 from agents.evaluation.scoring import run_episodes
 from agents.observations import ObservationLayout
 from lean_yaw_env import Walker, WalkerParameters
+from lean_yaw_env.analysis.active_map import ActiveMap
 from lean_yaw_env.analysis.fixed_point import solve_fixed_point
 from lean_yaw_env.analysis.limit_cycle import cycle_at, find_gait
-from lean_yaw_env.analysis.section_map import ActiveMap
 from lean_yaw_env.envs.options import EnvOptions, gait_of
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.errors import NoGaitError

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import copy
+import json
 import math
+import os
 import pickle
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -12,6 +16,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+import torch
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import RecordVideo
@@ -221,6 +226,33 @@ def test_a_step_is_the_walker_s_own(mirror: bool) -> None:
         assert ledger == list(result.energy)
         assert info["least_normal_force"] == result.least_normal_force
         assert info["greatest_friction"] == result.greatest_friction
+
+
+_WITHOUT_COMPILER = """
+import json, warnings
+import gymnasium as gym, numpy as np
+import lean_yaw_env
+warnings.simplefilter("ignore")  # of numbers that are meant to overflow
+env = gym.make("LeanYaw/Slalom-v0", sensor_noise=0.1)
+seen = [env.reset(seed=1)[0]] + [env.step(np.array([0.1, 0.2], np.float32))[0] for _ in range(3)]
+print(json.dumps([list(map(float, each)) for each in seen]))
+"""
+
+
+def test_plain_python_gives_the_compiled_environment_s_numbers() -> None:
+    def run(**variables: str) -> Any:
+        done = subprocess.run(
+            [sys.executable, "-c", _WITHOUT_COMPILER],
+            env={**os.environ, **variables},
+            cwd=Path(__file__).parents[1],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return json.loads(done.stdout)
+
+    # single precision: products and sums are not fused there
+    np.testing.assert_allclose(run(NUMBA_DISABLE_JIT="1"), run(), rtol=0.0, atol=1e-5)
 
 
 def test_zero_action_is_the_paper_s_fixed_controller(gait: Vector) -> None:
@@ -462,6 +494,39 @@ def test_an_environment_without_pictures_says_how_to_get_them() -> None:
         assert env.render() is None
     with pytest.raises(ResetNeeded, match="reset"):
         WalkerEnv("Walk", render_mode="rgb_array").render()
+
+
+def test_keys_cover_what_can_be_held_and_steer_to_their_side() -> None:
+    env = WalkerEnv("Walk", mirror=False, start_disturbance=0.0)
+    keys = env.get_keys_to_action()
+    assert len(keys) == 2**4  # every way to hold four keys, none among them
+    assert all(env.action_space.contains(action) for action in keys.values())
+    assert (keys[""] == 0.0).all()
+    ends = {}
+    for key in ("a", "d", "w", "s"):
+        env.reset(seed=0, options={"stance": "left"})
+        for _ in range(30):
+            *_, info = env.step(keys[key])
+        ends[key] = info
+    assert ends["a"]["footprint"][1] < 0.0 < ends["d"]["footprint"][1]
+    assert ends["w"]["speed"] > ends["s"]["speed"]
+    with pytest.raises(ValueError, match="mirror must be False"):
+        WalkerEnv("Walk").get_keys_to_action()
+
+
+@pytest.mark.parametrize(
+    "name", ["TimeAwareObservation", "NumpyToTorch", "RecordEpisodeStatistics"]
+)
+def test_gymnasium_s_wrappers_take_it(name: str) -> None:
+    if name == "NumpyToTorch":
+        pytest.importorskip("array_api_compat")
+    env = getattr(gym.wrappers, name)(gym.make("LeanYaw/Push-v0", max_episode_steps=5))
+    env.reset(seed=1)
+    zero = env.unwrapped.action_space.sample() * 0
+    if name == "NumpyToTorch":
+        zero = torch.from_numpy(zero)
+    ends = [tuple(env.step(zero)[2:4]) for _ in range(5)]
+    assert ends[-1] == (False, True)
 
 
 # --- bad input

@@ -5,13 +5,16 @@ from __future__ import annotations
 import copy
 import multiprocessing
 import pickle
+import warnings
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pytest
+import torch
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 from numpy.typing import NDArray
@@ -348,7 +351,7 @@ def test_a_threaded_batch_works_in_a_forked_child() -> None:
     [
         ({"num_envs": 0}, "num_envs must be from 1 to 10000000, got 0"),
         ({"threads": 0}, "threads must be from 1 to 1024, got 0"),
-        ({"render_mode": "rgb_array"}, "render_mode must be None for many walkers"),
+        ({"render_mode": "human"}, "render_mode must be one of rgb_array, got 'human'"),
         ({"autoreset_mode": "never"}, "'never' is not a valid AutoresetMode"),
         ({"task": "Swim"}, "task must be one of"),
         ({"mirror": 1}, "mirror must be True or False, got 1"),
@@ -414,3 +417,81 @@ def test_stepping_what_is_not_reset_is_refused() -> None:
         pass
     with pytest.raises(ResetNeeded, match=r"walkers \[.*\] have ended"):
         env.step(actions)
+
+
+# --- pictures
+
+
+def test_pictures_of_many_walkers_are_those_of_single_ones_in_small() -> None:
+    env = WalkerVectorEnv(3, "Waypoint", render_mode="rgb_array", horizon=3.0)
+    with pytest.raises(ResetNeeded, match="reset"):
+        env.render()
+    env.reset(seed=1)
+    frames = []
+    for _ in range(8):  # over an end and a start
+        env.step(np.zeros((3, 2), np.float32))
+        rendered = env.render()
+        assert rendered is not None
+        frames.append(rendered)
+    assert all(frame.shape == (360, 480, 3) for frame in frames[0])
+    assert all(frame.dtype == np.uint8 for frame in frames[0])
+    assert all((frame != other).any() for frame, other in zip(frames[0], frames[1], strict=True))
+    assert (frames[0][0] != frames[0][1]).any()
+
+
+def test_gymnasium_records_a_video_of_many_walkers(tmp_path: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the encoder's own
+        env = gym.wrappers.vector.RecordVideo(
+            gym.make_vec("LeanYaw/Heading-v0", num_envs=4, render_mode="rgb_array"),
+            str(tmp_path),
+            video_length=3,
+        )
+        env.reset(seed=1)
+        for _ in range(4):
+            env.step(np.zeros((4, 2), np.float32))
+        env.close()
+    (video,) = tmp_path.glob("*.mp4")
+    assert video.stat().st_size > 5_000
+
+
+def test_too_many_walkers_to_draw_are_refused() -> None:
+    with pytest.raises(ValueError, match="draws at most 64 walkers, got num_envs=65"):
+        WalkerVectorEnv(65, render_mode="rgb_array")
+    env = WalkerVectorEnv(2)
+    env.reset(seed=0)
+    with pytest.warns(UserWarning, match="make the environment with a render_mode"):
+        assert env.render() is None
+
+
+# --- Gymnasium's wrappers
+
+
+def test_tensors_share_the_arrays_memory() -> None:
+    pytest.importorskip("array_api_compat")
+    env = gym.wrappers.vector.NumpyToTorch(gym.make_vec("LeanYaw/Push-v0", num_envs=4))
+    observations, info = env.reset(seed=1)
+    assert observations.dtype == torch.float32
+    for _ in range(20):
+        observations, rewards, terminated, _, info = env.step(torch.zeros((4, 2)))
+    assert info["fall"].dtype == torch.int64
+    assert info["state"].shape == (4, 5)
+    assert rewards.dtype == torch.float64
+    assert terminated.dtype == torch.bool
+    lean = gym.wrappers.vector.NumpyToTorch(
+        gym.make_vec("LeanYaw/Push-v0", num_envs=4, copy=False, step_info=False)
+    )
+    observations, _ = lean.reset(seed=1)
+    own = lean.unwrapped
+    assert isinstance(own, WalkerVectorEnv)
+    assert observations.data_ptr() == own.simulation.observations.ctypes.data
+
+
+def test_arguments_for_other_vector_environments_are_refused_by_gymnasium_with_the_way_to_write_them() -> (
+    None
+):
+    with pytest.raises(gym.error.Error, match="only through kwargs"):
+        gym.make_vec("LeanYaw/Walk-v0", num_envs=2, vector_kwargs={"copy": False})
+    made = gym.make_vec("LeanYaw/Walk-v0", num_envs=2, copy=False).unwrapped
+    assert isinstance(made, WalkerVectorEnv)
+    assert made.copy is False

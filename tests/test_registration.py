@@ -28,6 +28,8 @@ def test_every_task_has_an_id_in_the_namespace() -> None:
         spec = gym.spec(f"{NAMESPACE}/{name}-v{version}")
         assert (spec.namespace, spec.name, spec.version) == (NAMESPACE, name, version)
         assert spec.make().unwrapped.task.name == name
+        is_judged_by_return = task_named(name).headline == "return"
+        assert (spec.reward_threshold is not None) == is_judged_by_return
 
 
 def test_registering_again_changes_nothing() -> None:

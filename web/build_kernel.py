@@ -255,8 +255,13 @@ def vehicles() -> str:
         "BENCHMARK_BICYCLE": asdict(BENCHMARK_2007),
         "SKATEBOARD": asdict(Skateboard()),
     }
-    lines = ["// Written by build_kernel.py from lean_yaw_env.vehicles; do not edit. SI units, angles in radians.", ""]
-    lines += [f"export const {name} = {json.dumps(table, indent=2)};" for name, table in tables.items()]
+    lines = [
+        "// Written by build_kernel.py from lean_yaw_env.vehicles; do not edit. SI units, angles in radians.",
+        "",
+    ]
+    lines += [
+        f"export const {name} = {json.dumps(table, indent=2)};" for name, table in tables.items()
+    ]
     return "\n".join([*lines, ""])
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.registration import TASK_VERSIONS
+from lean_yaw_env.registration import ALL_TASKS, GOAL_TASK, TASK_VERSIONS
 from lean_yaw_env.validation import require_choice
 
 from ..observations import ObservationLayout
@@ -15,6 +15,7 @@ from ..policies.policy import Policy, PolicyCard, package_versions
 from ..policies.storage import task_of
 from ..settings import tuned
 from .apg import GradientLearner, GradientSettings
+from .her import HERLearner, HERSettings
 from .learner import LearnerSettings, MakeLearner, settings_to_plain, torch_threads
 from .ppo import PPOLearner, PPOSettings
 from .recorder import Recorder, Report, TrainingLog
@@ -35,18 +36,21 @@ class Algorithm:
 
     Attributes
     ----------
-    settings : class of its settings
+    settings : class of its settings, a ``LearnerSettings``
     make : its learner's class
+    tasks : that it can learn
     """
 
-    settings: type[LearnerSettings]
+    settings: type[Any]
     make: MakeLearner
+    tasks: tuple[str, ...] = ALL_TASKS
 
 
 ALGORITHMS: dict[str, Algorithm] = {
     "ppo": Algorithm(PPOSettings, PPOLearner),
     "sac": Algorithm(SACSettings, SACLearner),
-    "apg": Algorithm(GradientSettings, GradientLearner),
+    "apg": Algorithm(GradientSettings, GradientLearner, tuple(TASK_VERSIONS)),
+    "her": Algorithm(HERSettings, HERLearner, (GOAL_TASK,)),
 }
 """By the names that their policies carry."""
 
@@ -57,10 +61,10 @@ def settings_for(algorithm: str, task: str) -> Any:
     Raises
     ------
     ValueError
-        For an algorithm or a task there is not.
+        For an algorithm or a task there is not, or a task that the algorithm cannot learn.
     """
     entry = ALGORITHMS[require_choice("algorithm", algorithm, ALGORITHMS)]
-    require_choice("task", task, TASK_VERSIONS)
+    require_choice(f"task of {algorithm}", task, entry.tasks)
     return tuned(algorithm, task, entry.settings())
 
 

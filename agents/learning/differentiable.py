@@ -153,8 +153,9 @@ class DifferentiableWalkers:
         """The numbers of the step just made, as the Jacobians' rows name them; a fall takes no time here."""
         simulation = self._simulation
         durations = np.where(simulation.terminated, 0.0, simulation.walkers["duration"])
+        observations = simulation.observations.astype(np.float64)
         return np.column_stack(
-            [self._linearised.values(), simulation.observations, simulation.rewards, durations]
+            [self._linearised.values(), observations, simulation.rewards, durations]
         )
 
     def _restart(self, ended: NDArray[np.bool_]) -> None:

@@ -7,25 +7,30 @@ steps, since a step's reward, spread evenly over its duration, is discounted wit
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from stable_baselines3.common.buffers import ReplayBuffer, RolloutBuffer
-from stable_baselines3.common.type_aliases import ReplayBufferSamples
+from stable_baselines3.common.type_aliases import DictReplayBufferSamples, ReplayBufferSamples
 from stable_baselines3.common.vec_env import VecNormalize
 
-from .recorder import Arrays
+from lean_yaw_env.envs.hindsight import HindsightReplay
 
-_COLUMNS = (
-    "observations", "next_observations", "actions", "rewards", "dones", "timeouts", "durations",
-)  # fmt: skip
+from .recorder import Arrays
 
 
 def mean_discount(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean of exp(-t / time constant) over steps of durations ``ratio`` times the time constant; 1 at its limit of no duration."""
     return np.where(ratio > 0.0, -np.expm1(-ratio) / np.where(ratio > 0.0, ratio, 1.0), 1.0)
+
+
+def named_arrays(name: str, value: Any) -> Arrays:
+    """An array, or each array of a dictionary, under a name of its own; views."""
+    if isinstance(value, dict):
+        return {f"{name}.{key}": each for key, each in value.items()}
+    return {name: np.asarray(value)}
 
 
 class TimeDiscountedBuffer(RolloutBuffer):
@@ -62,8 +67,8 @@ class TimeDiscountedBuffer(RolloutBuffer):
         self.returns = self.advantages + self.values
 
 
-class TimeDiscountedReplay(ReplayBuffer):
-    """Stable-Baselines3's replay buffer with a discount of exp(-duration / time constant) for each step.
+class _TimedReplay:
+    """What replay buffers of Stable-Baselines3 add to be discounted by exp(-duration / time constant) for each step, and kept in a file.
 
     What an algorithm multiplies the next value by is (1 - done) times its own discount, so that here ``dones``
     are one less the step's discount, and the algorithm's own must be 1.
@@ -76,8 +81,12 @@ class TimeDiscountedReplay(ReplayBuffer):
     ``durations`` (steps, walkers) is to be filled before each ``add``.
     """
 
+    columns: ClassVar[tuple[str, ...]] = (
+        "observations", "next_observations", "actions", "rewards", "dones", "timeouts", "durations",
+    )  # fmt: skip
+
     def __init__(
-        self, *arguments: Any, time_constant: float, typical_duration: float, **keywords: Any
+        self: Any, *arguments: Any, time_constant: float, typical_duration: float, **keywords: Any
     ) -> None:
         super().__init__(*arguments, **keywords)
         self.time_constant = time_constant
@@ -85,9 +94,9 @@ class TimeDiscountedReplay(ReplayBuffer):
         self.durations: NDArray[np.float64] = np.zeros((self.buffer_size, self.n_envs))
 
     def add(
-        self,
-        obs: NDArray[Any],
-        next_obs: NDArray[Any],
+        self: Any,
+        obs: Any,
+        next_obs: Any,
         action: NDArray[Any],
         reward: NDArray[Any],
         done: NDArray[Any],
@@ -97,18 +106,29 @@ class TimeDiscountedReplay(ReplayBuffer):
         self.durations[self.pos][np.asarray(done, dtype=np.bool_)] = self.typical_duration
         super().add(obs, next_obs, action, reward, done, infos)
 
-    def captured(self) -> Arrays:
+    def captured(self: Any) -> Arrays:
         """The experience there is, and where the next goes."""
         filled = self.buffer_size if self.full else self.pos
-        arrays: Arrays = {name: getattr(self, name)[:filled] for name in _COLUMNS}
+        arrays = {name: column[:filled] for name, column in self._columns().items()}
         return arrays | {"position": np.array([self.pos, filled])}
 
-    def restore(self, arrays: Arrays) -> None:
+    def restore(self: Any, arrays: Arrays) -> None:
         """Bring the buffer to what ``captured`` gave, or raise ``KeyError`` or ``ValueError`` if it is another buffer's."""
         self.pos, filled = (int(value) for value in arrays["position"])
         self.full = filled == self.buffer_size
-        for name in _COLUMNS:
-            getattr(self, name)[:filled] = arrays[name]
+        for name, column in self._columns().items():
+            column[:filled] = arrays[name]
+
+    def _columns(self) -> Arrays:
+        """All of the experience by name, one column for each key of a dictionary."""
+        columns: Arrays = {}
+        for name in self.columns:
+            columns |= named_arrays(name, getattr(self, name))
+        return columns
+
+
+class TimeDiscountedReplay(_TimedReplay, ReplayBuffer):
+    """Stable-Baselines3's replay buffer, discounted in time."""
 
     def _get_samples(
         self, batch_inds: NDArray[np.int64], env: VecNormalize | None = None
@@ -127,3 +147,38 @@ class TimeDiscountedReplay(ReplayBuffer):
             rewards.astype(np.float32)[:, None],
         )
         return ReplayBufferSamples(*(self.to_torch(array) for array in data))
+
+
+class TimeDiscountedHindsight(_TimedReplay, HindsightReplay):
+    """Hindsight replay, discounted in time: to be at a goal at the time t is worth exp(-t / time constant)."""
+
+    columns: ClassVar[tuple[str, ...]] = (*_TimedReplay.columns, "ep_start", "ep_length")
+
+    def captured(self) -> Arrays:
+        """The experience there is, where the next goes, and where the episodes under way began."""
+        return super().captured() | {"under_way": self._current_ep_start.copy()}
+
+    def restore(self, arrays: Arrays) -> None:
+        """Bring the buffer to what ``captured`` gave; see ``TimeDiscountedReplay``."""
+        super().restore(arrays)
+        self._current_ep_start[:] = arrays["under_way"]
+
+    def _get_real_samples(
+        self, batch_indices: Any, env_indices: Any, env: VecNormalize | None = None
+    ) -> DictReplayBufferSamples:
+        samples = super()._get_real_samples(batch_indices, env_indices, env)
+        return self._discounted(samples, batch_indices, env_indices)
+
+    def _get_virtual_samples(
+        self, batch_indices: Any, env_indices: Any, env: VecNormalize | None = None
+    ) -> DictReplayBufferSamples:
+        samples = super()._get_virtual_samples(batch_indices, env_indices, env)
+        return self._discounted(samples, batch_indices, env_indices)
+
+    def _discounted(
+        self, samples: DictReplayBufferSamples, batch_indices: Any, env_indices: Any
+    ) -> DictReplayBufferSamples:
+        ratio = self.durations[batch_indices, env_indices] / self.time_constant
+        discount = self.to_torch(np.exp(-ratio).astype(np.float32)).reshape(-1, 1)
+        cut = 1.0 - (1.0 - samples.dones) * discount
+        return samples._replace(dones=cut, rewards=samples.rewards * discount)

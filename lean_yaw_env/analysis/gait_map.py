@@ -295,7 +295,8 @@ def _walker_grid(section_map: ActiveMap, points: Mapping[str, Vector], threads: 
         bodies[:, Body._fields.index(name)] = points[name]
     mean, apart = commands["mass_offset"], commands["alternating_offset"]
     offsets = np.column_stack([mean + apart, mean - apart])
-    return WalkerGrid(bodies, commands["inter_leg_angle"], offsets, threads)
+    symmetric = np.full(n, section_map.n_steps % 2 == 1)
+    return WalkerGrid(bodies, commands["inter_leg_angle"], offsets, symmetric, threads)
 
 
 def _columns(

@@ -6,7 +6,7 @@ import math
 import sys
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -52,14 +52,11 @@ def gait(
     ] = 0.0,
 ) -> Output:
     """Find a walker's limit cycle and print it with its multipliers; the defaults are Table 1's."""
-    from lean_yaw_env.analysis import find_limit_cycle, section_map_of
+    from lean_yaw_env.analysis import find_limit_cycle
 
-    offsets: dict[str, Any] = {
-        "inter_leg_angle": inter_leg_angle,
-        "mass_offset": (mass_offset + alternating_offset, mass_offset - alternating_offset),
-    }
-    cycle = find_limit_cycle(walker, **offsets)
-    record = rows.gait_record(cycle, section_map_of(walker, **offsets).names)
+    offsets = mass_offset + alternating_offset, mass_offset - alternating_offset
+    cycle = find_limit_cycle(walker, inter_leg_angle=inter_leg_angle, mass_offset=offsets)
+    record = rows.gait_record(cycle)
     return Output(record, lambda: screen.show_gait(record))
 
 
@@ -183,9 +180,7 @@ def _vehicle(record: rows.Record) -> Output:
 
 @command()
 def view(
-    walk: Annotated[
-        Path | None, typer.Option(help="Show this walk, saved with Walk.save.")
-    ] = None,
+    walk: Annotated[Path | None, typer.Option(help="Show this walk, saved with Walk.save.")] = None,
     port: Annotated[int, typer.Option(help="Of this machine; 0 takes a free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
 ) -> Output:

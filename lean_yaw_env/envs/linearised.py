@@ -7,8 +7,8 @@ import numpy as np
 from lean_yaw_env.envs.derivatives import COMMANDED, FOLLOWED, followed_fields
 from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.envs.state import states_of
-from lean_yaw_env.kernel.jacobian import INPUTS, OUTPUTS
-from lean_yaw_env.kernel.jacobians import step_jacobians
+from lean_yaw_env.kernel.jacobian import OUTPUTS, step_jacobians
+from lean_yaw_env.kernel.records import Command
 from lean_yaw_env.parameters import STATE_SIZE, Vector
 from lean_yaw_env.threads import share_out
 
@@ -41,7 +41,7 @@ class LinearisedSteps:
         n = simulation.n
         self._before = simulation.walkers.copy(), simulation.tasks.copy()
         self._afters = np.zeros(n), np.zeros((n, STATE_SIZE))
-        self._steps = np.zeros((n, len(OUTPUTS), INPUTS))
+        self._steps = np.zeros((n, len(OUTPUTS), STATE_SIZE + len(Command._fields)))
 
     def prepare(self) -> None:
         """Note the records before a step."""

@@ -112,9 +112,7 @@ class PageServer:
         self._thread.join()
 
 
-def view(
-    walk: str | Path | None = None, *, port: int = 0, open_browser: bool = True
-) -> PageServer:
+def view(walk: str | Path | None = None, *, port: int = 0, open_browser: bool = True) -> PageServer:
     """Serve the page on this machine only, and open it in the browser.
 
     Parameters

@@ -15,6 +15,8 @@ export interface Exhibit {
   leave(): void;
   /** Let time pass, in units of the exhibit's model; zero while paused. `real`: seconds since the last frame. */
   frame(duration: number, real: number): void;
+  /** Whether something on the stage moves even while time stands still. */
+  readonly isMoving: boolean;
   reset(): void;
   push(strong: boolean): void;
   stepOnce(): void;

@@ -148,8 +148,8 @@ async function main(): Promise<void> {
     requestAnimationFrame(frame);
     if (held) return;
     frames.begin();
-    active.frame(playing ? real * rate * active.timeScale() : 0, real);
-    stage.render();
+    if (playing || active.isMoving || stage.isTurning) active.frame(playing ? real * rate * active.timeScale() : 0, real);
+    stage.renderIfStale();
     frames.end();
   }
   requestAnimationFrame(frame);

@@ -90,8 +90,6 @@ class Task:
     pumping : float
         Episodes start in the gait driven by this offset, away from the stance foot; 0 is the gait that the slope drives.
     headline : the metric, or "return", by which agents are compared: it must say enough without a look at survival
-    reward_threshold : float, optional
-        The return of an episode from which on the task counts as solved.
 
     Raises
     ------
@@ -123,7 +121,6 @@ class Task:
     push_level: float = 0.0
     pumping: float = 0.0
     headline: str = "return"
-    reward_threshold: float | None = None
 
     def __post_init__(self) -> None:
         common = {field.name for field in WALKER_FIELDS}

@@ -145,6 +145,10 @@ abstract class VehicleExhibit implements Exhibit {
     return Object.fromEntries(changed.map(([name, value]) => [name, String(value)]));
   }
 
+  get isMoving(): boolean {
+    return this.arrow.isShown;
+  }
+
   timeScale(): number {
     return 2.5; // at the walkers' usual slow motion a bicycle rides in real time
   }

@@ -25,7 +25,7 @@ import { Facts, h, section } from "../ui/dom";
 import { number } from "../ui/plot";
 import { Slider } from "../ui/slider";
 
-type Name = Exclude<keyof Parameters, "slope_turns">;
+type Name = Exclude<keyof Parameters, "slope_turns" | "more">;
 
 interface Knob {
   name: Name;
@@ -256,6 +256,10 @@ export class WalkExhibit implements Exhibit {
     return settings;
   }
 
+  get isMoving(): boolean {
+    return this.arrow.isShown;
+  }
+
   timeScale(): number {
     return 1 / units.timeUnit();
   }
@@ -264,6 +268,7 @@ export class WalkExhibit implements Exhibit {
 
   reset(): void {
     this.replay = null;
+    delete this.parameters.more;
     this.start();
   }
 
@@ -322,8 +327,9 @@ export class WalkExhibit implements Exhibit {
     let k = -1;
     const side = saved.stances[0] === "left" ? 1 : -1;
     return new Walk(this.app.kernel, this.kind, { state: saved.states[0], side, offset: saved.mass_offsets[0] }, () => {
-      k = Math.min(k + 1, saved.inter_leg_angles.length - 1);
-      const command = { inter_leg_angle: saved.inter_leg_angles[k], mass_offset: saved.commanded_offsets[k] };
+      k++;
+      const last = Math.min(k, saved.inter_leg_angles.length - 1);
+      const command = { inter_leg_angle: saved.inter_leg_angles[last], mass_offset: saved.commanded_offsets[last] };
       return { parameters: { ...this.parameters, ...command }, state: saved.states[k] };
     });
   }
@@ -395,6 +401,7 @@ export class WalkExhibit implements Exhibit {
   }
 
   private stepped(record: StepRecord): void {
+    if (this.replay && this.walk.records.length === this.replay.inter_leg_angles.length) this.ended(this.replay);
     this.returnMap.add(record);
     if (this.app.stage.world.rotation.z !== -this.parameters.slope) this.app.stage.setSlope(this.parameters.slope);
     this.drawSteps();
@@ -408,6 +415,20 @@ export class WalkExhibit implements Exhibit {
       h("div", { class: "card fall", id: "fall" },
         h("strong", {}, `It fell: ${fall!.name}`), h("span", {}, ` after ${record.index} steps. `), h("p", {}, fall!.why),
         h("button", { type: "button", onclick: () => this.reset() }, "Start again (R)")),
+    );
+  }
+
+  /** The saved walk is over: the next steps would be the page's own. */
+  private ended(saved: SavedWalk): void {
+    this.app.play(false);
+    const again = () => {
+      this.open(saved);
+      this.app.play(true);
+    };
+    this.app.notice(
+      h("div", { class: "card", id: "ended" }, h("strong", {}, "The saved walk ends here. "),
+        h("p", {}, "Played on, the walker goes on with its last command."),
+        h("div", { class: "row" }, h("button", { type: "button", onclick: again }, "From the start"), h("button", { type: "button", onclick: () => this.reset() }, "Leave it (R)"))),
     );
   }
 

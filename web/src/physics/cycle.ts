@@ -2,7 +2,7 @@
 
 import type { Body, Command, Kernel, Side, State } from "../kernel/kernel";
 import { OUTPUTS, STATE_SIZE, STATUS } from "../kernel/layout";
-import { eigen, identity, magnitude, product, selected, solve, type Complex, type Matrix } from "./linalg";
+import { determinant, eigen, identity, magnitude, product, selected, solve, type Complex, type Matrix } from "./linalg";
 import { bodyOf, COORDINATES, fallOf, MIRROR, mirrored, type Parameters } from "./walker";
 
 export interface Mode {
@@ -31,7 +31,7 @@ export interface Cycle {
 
 /** Largest change of any coordinate over the map that still counts as a fixed point, as in the package. */
 const RESIDUAL_LIMIT = 1e-12;
-const MOST_ITERATIONS = 40;
+const MOST_ITERATIONS = 30;
 const LATERAL = new Set(["heading", "ankle_angle", "ankle_rate"]);
 
 /** A map of the section onto itself with its derivative; null where it ends in a fall. */
@@ -105,7 +105,7 @@ export function fixedPoint(map: SectionMap, guess: State): State | null {
     let share = 1;
     let next: State | null = null;
     let after: number[] | null = null;
-    for (let halving = 0; halving < 8; halving++, share *= 0.5) {
+    for (let halving = 0; halving < 4; halving++, share *= 0.5) {
       next = [...state];
       map.free.forEach((k, i) => (next![k] += share * step[i]));
       after = change(map, next);
@@ -117,6 +117,43 @@ export function fixedPoint(map: SectionMap, guess: State): State | null {
     now = after;
   }
   return largest(now) <= RESIDUAL_LIMIT ? state : null;
+}
+
+/** A sign that a fixed point keeps along a path of maps until it passes a fold. */
+export function sideOfFolds(map: SectionMap, state: State): number {
+  const derivative = map.derivative(state);
+  if (!derivative) return 0;
+  const slope = selected(derivative.matrix, map.free);
+  slope.forEach((row, i) => (row[i] -= 1));
+  return Math.sign(determinant(slope));
+}
+
+/** A map for every share from 0 to 1. */
+export type Path = (share: number) => SectionMap;
+
+const FIRST_PIECE = 0.25;
+const SMALLEST_PIECE = 1 / 256;
+
+/** Follow a fixed point along a path of maps, in pieces that shrink where it fails; on one side of folds only, if one is given. */
+export function followed(path: Path, start: State, side?: number): State | null {
+  let state = fixedPoint(path(0), start);
+  let [reached, piece] = [0, FIRST_PIECE];
+  let previous: { reached: number; state: State } | null = null;
+  while (state && reached < 1) {
+    const target = Math.min(1, reached + piece);
+    const now: State = state;
+    const share: number = previous ? (target - reached) / (reached - previous.reached) : 0;
+    const guess = now.map((value, k) => value + share * (value - (previous?.state[k] ?? value)));
+    const map = path(target);
+    const found = fixedPoint(map, guess);
+    if (found && (side === undefined || sideOfFolds(map, found) === side)) {
+      previous = { reached, state: now };
+      [state, reached, piece] = [found, target, piece * 1.5];
+    } else if ((piece *= 0.5) < SMALLEST_PIECE) {
+      return null;
+    }
+  }
+  return state;
 }
 
 /** Modes of a map's derivative, by falling magnitude; a mode is named by the coordinates that take the larger part in it. */
@@ -172,32 +209,30 @@ function planarGuess(p: Parameters): State | null {
   return Number.isNaN(rate) ? null : [heading, 0.5 * p.inter_leg_angle, 0, rate, 0];
 }
 
-/** Follow the gait from no hip width and no offset, in pieces that shrink where it fails. */
-function widened(kernel: Kernel, p: Parameters, steps: number): State | null {
-  const at = (share: number): Parameters => ({ ...p, hip_width: share * p.hip_width, mass_offset: share * p.mass_offset });
-  const start = planarGuess(at(0));
-  let state = start && fixedPoint(activeMap(kernel, at(0), steps), start);
-  let reached = 0;
-  let piece = 0.25;
-  while (state && reached < 1) {
-    const target = Math.min(1, reached + piece);
-    const found = fixedPoint(activeMap(kernel, at(target), steps), state);
-    if (found) [state, reached, piece] = [found, target, piece * 1.5];
-    else if ((piece *= 0.5) < 1 / 64) return null;
-  }
-  return state;
+/** The map at no hip width and no offset (share 0) up to the walker's own (share 1). */
+function widening(kernel: Kernel, p: Parameters, steps: number): Path {
+  return (share) => activeMap(kernel, { ...p, hip_width: share * p.hip_width, mass_offset: share * p.mass_offset }, steps);
 }
 
 /**
  * The steered walker's gait at a constant command, with its multipliers; null where there is none.
  *
- * Starts as the package does: from the planar gait's closed form, then by raising the hip width; last from `nearby`.
+ * As the package searches (`search_active`): solved from the planar gait's closed form; where a fast and a slow gait exist, which meet at a
+ * fold, the one that the planar gait leads to. What Newton's method reaches from `nearby` comes last.
  */
 export function findCycle(kernel: Kernel, p: Parameters, nearby: State | null = null): Cycle | null {
   const steps = p.mass_offset === 0 ? 1 : 2;
   const map = activeMap(kernel, p, steps);
+  const path = widening(kernel, p, steps);
+  const planar = planarGuess({ ...p, mass_offset: 0 });
   const guess = planarGuess(p);
-  const state = (guess && fixedPoint(map, guess)) ?? widened(kernel, p, steps) ?? (nearby && fixedPoint(map, nearby));
+  let state = guess && fixedPoint(map, guess);
+  if (state && planar) {
+    const side = sideOfFolds(path(0), planar);
+    if (sideOfFolds(map, state) !== side) state = followed(path, planar, side) ?? state;
+  }
+  state ??= planar && followed(path, planar);
+  state ??= nearby && fixedPoint(map, nearby);
   return state && cycleAt(kernel, p, state);
 }
 

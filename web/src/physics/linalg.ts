@@ -47,6 +47,28 @@ export function solve(a: Matrix, b: number[]): number[] | null {
   return x;
 }
 
+/** Determinant, by elimination. */
+export function determinant(a: Matrix): number {
+  const m = a.map((row) => [...row]);
+  const n = m.length;
+  let value = 1;
+  for (let k = 0; k < n; k++) {
+    let pivot = k;
+    for (let i = k + 1; i < n; i++) if (Math.abs(m[i][k]) > Math.abs(m[pivot][k])) pivot = i;
+    if (pivot !== k) {
+      [m[k], m[pivot]] = [m[pivot], m[k]];
+      value = -value;
+    }
+    value *= m[k][k];
+    if (value === 0) return 0;
+    for (let i = k + 1; i < n; i++) {
+      const factor = m[i][k] / m[k][k];
+      for (let j = k; j < n; j++) m[i][j] -= factor * m[k][j];
+    }
+  }
+  return value;
+}
+
 export function magnitude(z: Complex): number {
   return Math.hypot(z.re, z.im);
 }

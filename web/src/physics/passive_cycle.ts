@@ -2,7 +2,7 @@
 
 import type { Kernel, Side, State } from "../kernel/kernel";
 import { PASSIVE_STATE_SIZE, STATUS } from "../kernel/layout";
-import { fixedPoint, modesOf, type Cycle, type SectionMap } from "./cycle";
+import { fixedPoint, followed, modesOf, type Cycle, type Path, type SectionMap } from "./cycle";
 import { identity, product, selected } from "./linalg";
 import { bodyOf, MIRROR, mirrored, PASSIVE_COORDINATES, type Parameters } from "./walker";
 
@@ -78,21 +78,6 @@ function planarGait(kernel: Kernel, p: Parameters): State | null {
   return best;
 }
 
-/** Raise the hip width from none. */
-function widened(kernel: Kernel, p: Parameters, start: State): State | null {
-  const at = (share: number) => passiveMap(kernel, { ...p, hip_width: share * p.hip_width }, false, 1);
-  let state = fixedPoint(at(0), start);
-  let reached = 0;
-  let piece = 0.25;
-  while (state && reached < 1) {
-    const target = Math.min(1, reached + piece);
-    const found = fixedPoint(at(target), state);
-    if (found) [state, reached, piece] = [found, target, piece * 1.5];
-    else if ((piece *= 0.5) < 1 / 64) return null;
-  }
-  return state;
-}
-
 /** The gait that Newton's method reaches from a state; null where it reaches none. */
 export function passiveCycleNear(kernel: Kernel, p: Parameters, planar: boolean, nearby: State): Cycle | null {
   const state = fixedPoint(passiveMap(kernel, p, planar, 1), nearby);
@@ -104,7 +89,8 @@ export function findPassiveCycle(kernel: Kernel, p: Parameters, planar: boolean,
   const close = nearby && passiveCycleNear(kernel, p, planar, nearby);
   if (close) return close;
   const flat = planarGait(kernel, p);
-  const state = flat && !planar && p.hip_width > 0 ? widened(kernel, p, flat) : flat;
+  const widening: Path = (share) => passiveMap(kernel, { ...p, hip_width: share * p.hip_width }, false, 1);
+  const state = flat && !planar && p.hip_width > 0 ? followed(widening, flat) : flat;
   return state && passiveCycleAt(kernel, p, planar, state);
 }
 

@@ -146,17 +146,17 @@ export class Walk {
       this.time = this.endTime;
       this.land();
     }
-    const fellBefore = this.hasFallen;
     this.time = this.current.fall ? Math.min(target, this.endTime + this.fallingTime) : target;
-    if (!fellBefore && this.hasFallen) {
+    if (this.hasFallen && this.records.at(-1) !== this.current) {
       this.records.push(this.current);
       this.onFall(this.current);
     }
   }
 
-  /** Go on to the end of the step on the way. */
+  /** Go on to the end of the step on the way, and of the fall if it ends in one. */
   finishStep(): void {
-    this.advance(Math.max(this.endTime - this.time, 0) + 1e-9);
+    const rest = Math.max(this.endTime - this.time, 0);
+    this.advance(this.current.fall ? rest + this.fallingTime : rest + 1e-9);
   }
 
   private land(): void {

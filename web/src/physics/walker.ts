@@ -14,6 +14,8 @@ export interface Parameters {
   inter_leg_angle: number;
   mass_offset: number;
   slope_turns: boolean;
+  /** Constants without a slider, of a walk that Python has saved. */
+  more?: Partial<Body>;
 }
 
 /** Table 1 of the paper. */
@@ -32,8 +34,8 @@ export const TABLE_1: Readonly<Parameters> = {
 export const SHIFT_TIME = 0.35;
 const MAX_STEP_DURATION = 10;
 
-/** The constants as the kernel takes them; `more` for what has no slider. */
-export function bodyOf(p: Parameters, more: Partial<Body> = {}): Body {
+/** The constants as the kernel takes them. */
+export function bodyOf(p: Parameters): Body {
   return {
     hip_width: p.hip_width,
     foot_radius: p.foot_radius,
@@ -46,7 +48,7 @@ export function bodyOf(p: Parameters, more: Partial<Body> = {}): Body {
     max_step_duration: MAX_STEP_DURATION,
     slope_turns: p.slope_turns ? 1 : 0,
     strike_at_start: 0,
-    ...more,
+    ...p.more,
   };
 }
 

@@ -20,6 +20,10 @@ export class PushArrow {
     this.mesh.visible = false;
   }
 
+  get isShown(): boolean {
+    return this.left > 0;
+  }
+
   /** A push to the right (or left, negative) and ahead, in the walker's own directions. */
   show(right: number, ahead: number, strength: number): void {
     this.left = DURATION;

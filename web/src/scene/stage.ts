@@ -25,6 +25,7 @@ const QUALITIES = [
   { pixels: 1, shadow: 1024 },
   { pixels: 0.75, shadow: 1024 },
   { pixels: 0.5, shadow: 512 },
+  { pixels: 0.2, shadow: 0 }, // taken only when asked for
 ];
 /** ms between frames above which the next lower quality is taken, and how many frames are looked at. */
 const SLOW = 42;
@@ -44,6 +45,7 @@ export class Stage {
   private tween: { from: THREE.Vector3; share: number } | null = null;
   private shift = new THREE.Vector2();
   private slowFrames = 0;
+  private isStale = true;
   private scale = 1;
   quality = 0;
 
@@ -127,6 +129,7 @@ export class Stage {
 
   /** Follow a point of the floor's frame, and with some delay a heading; `jump`: without. */
   follow(point: THREE.Vector3Like, heading: number, duration: number, jump = false): void {
+    this.invalidate();
     const wanted = this.world.localToWorld(new THREE.Vector3(point.x, point.y, point.z));
     const share = jump ? 1 : 1 - Math.exp(-duration / SETTLING_TIME);
     const turn = (heading - this.heading) * share;
@@ -160,12 +163,14 @@ export class Stage {
     this.camera.fov = width < height ? 46 : 36;
     this.camera.setViewOffset(width, height, 0.5 * this.shift.x * width, 0.5 * this.shift.y * height, width, height);
     this.camera.updateProjectionMatrix();
+    this.invalidate();
   }
 
   setQuality(quality: number): void {
     this.quality = Math.min(Math.max(quality, 0), QUALITIES.length - 1);
     const { shadow } = QUALITIES[this.quality];
-    this.sun.shadow.mapSize.set(shadow, shadow);
+    this.sun.castShadow = shadow > 0;
+    this.sun.shadow.mapSize.set(shadow || 1, shadow || 1);
     this.sun.shadow.map?.dispose();
     this.sun.shadow.map = null;
     this.resize();
@@ -174,13 +179,28 @@ export class Stage {
   /** Tell how long it is since the last frame; where that stays long the picture gets coarser. */
   adapt(milliseconds: number): void {
     this.slowFrames = milliseconds > SLOW ? this.slowFrames + 1 : Math.max(this.slowFrames - 1, 0);
-    if (this.slowFrames < LOOKED_AT || this.quality === QUALITIES.length - 1) return;
+    if (this.slowFrames < LOOKED_AT || this.quality >= QUALITIES.length - 2) return;
     this.slowFrames = 0;
     this.setQuality(this.quality + 1);
   }
 
+  /** Something has moved: the next frame is to be drawn. */
+  invalidate(): void {
+    this.isStale = true;
+  }
+
+  /** Draw if anything has moved since the last picture, the camera included. */
+  renderIfStale(): void {
+    if (this.controls.update() || this.isStale) this.render();
+  }
+
+  /** Whether the camera is on its way to another place. */
+  get isTurning(): boolean {
+    return this.tween !== null;
+  }
+
   render(): void {
-    this.controls.update();
+    this.isStale = false;
     const { target } = this.controls;
     this.sun.target.position.copy(target).setY(target.y - 0.4);
     this.sun.position.copy(this.sun.target.position).add(new THREE.Vector3(-1.7, 4.1, 2.3).multiplyScalar(this.scale));

@@ -1,7 +1,7 @@
 // Walks as files: tables out, and walks that Python has saved in.
 
 import type { StepRecord } from "../physics/walk";
-import { COORDINATES, TABLE_1, type Parameters } from "../physics/walker";
+import { COORDINATES, type Parameters } from "../physics/walker";
 import { h } from "../ui/dom";
 
 export function download(name: string, content: Blob): void {
@@ -57,13 +57,25 @@ export function parseWalk(text: string): SavedWalk {
   return walk;
 }
 
-/** The sliders' parameters of a saved walk. */
+/** The parameters of a saved walk. */
 export function parametersOf(walk: SavedWalk): Parameters {
-  const parameters = { ...TABLE_1 };
-  for (const name of Object.keys(parameters) as (keyof Parameters)[]) {
-    const value = walk.parameters[name];
-    if (value !== undefined) (parameters as Record<string, unknown>)[name] = value;
-  }
-  parameters.inter_leg_angle = walk.inter_leg_angles[0];
-  return parameters;
+  const saved = walk.parameters;
+  const number = (name: string) => (saved[name] === "inf" ? Infinity : Number(saved[name]));
+  return {
+    hip_width: number("hip_width"),
+    foot_radius: number("foot_radius"),
+    ankle_tilt: number("ankle_tilt"),
+    slope: number("slope"),
+    ankle_stiffness: number("ankle_stiffness"),
+    ankle_damping: number("ankle_damping"),
+    slope_turns: saved.slope_turns === true,
+    inter_leg_angle: walk.inter_leg_angles[0],
+    mass_offset: 0,
+    more: {
+      shift_time: number("shift_time"),
+      friction_limit: number("friction_limit"),
+      max_step_duration: number("max_step_duration"),
+      strike_at_start: saved.early_contact === "strike" ? 1 : 0,
+    },
+  };
 }

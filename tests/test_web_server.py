@@ -1,0 +1,82 @@
+"""The page's server on the loopback interface, and saved walks."""
+
+from __future__ import annotations
+
+import json
+import re
+import urllib.error
+import urllib.request
+
+import numpy as np
+import pytest
+
+from lean_yaw_env import Walker, WalkerParameters
+from lean_yaw_env.viewer import PAGE, PageServer
+
+
+def answer(address, **headers):
+    """Status and body of an address."""
+    try:
+        with urllib.request.urlopen(urllib.request.Request(address, headers=headers)) as response:
+            return response.status, response.read()
+    except urllib.error.HTTPError as error:
+        return error.code, b""
+
+
+def test_server_gives_the_page_and_all_that_it_names():
+    with PageServer() as server:
+        status, page = answer(server.address)
+        assert status == 200
+        for name in re.findall(r'(?:src|href)="\./([^"]+)"', page.decode()):
+            assert answer(server.address + name) == (200, (PAGE / name).read_bytes())
+
+
+def test_server_listens_on_the_loopback_interface_only():
+    with PageServer() as server:
+        assert server._server.server_address[0] == "127.0.0.1"
+
+
+def test_server_answers_nothing_under_another_machines_name():
+    with PageServer() as server:
+        assert answer(server.address, Host="example.org")[0] == 403
+
+
+def test_server_gives_nothing_outside_the_page_and_lists_no_folder(tmp_path):
+    with PageServer() as server:
+        assert answer(server.address + "assets/")[0] == 404
+        assert answer(server.address + "../server.py")[0] == 404
+        assert answer(server.address + "walk.json")[0] == 404
+
+
+def test_server_gives_the_walk_that_it_was_given(tmp_path):
+    walk = Walker(WalkerParameters()).walk(3, state=[0.0, 0.155, -0.004, -0.42, -0.07])
+    walk.save(tmp_path / "mine.json")
+    with PageServer(tmp_path / "mine.json") as server:
+        base, opened = server.address.split("#")
+        assert opened == "walk=./walk.json"
+        assert answer(base + "walk.json") == (200, (tmp_path / "mine.json").read_bytes())
+
+
+def test_missing_walk_is_refused(tmp_path):
+    with pytest.raises(FileNotFoundError, match="no walk at"):
+        PageServer(tmp_path / "none.json")
+
+
+def test_saved_walk_holds_every_number_exactly(tmp_path):
+    angles = np.linspace(0.28, 0.32, 5)
+    walk = Walker(WalkerParameters(hip_width=0.25)).walk(
+        5, state=[0.0, 0.155, -0.004, -0.42, -0.07], inter_leg_angle=angles, mass_offset=0.01
+    )
+    walk.save(tmp_path / "walk.json")
+    saved = json.loads((tmp_path / "walk.json").read_text())
+    assert np.array_equal(saved["states"], walk.states)
+    assert saved["inter_leg_angles"] == angles.tolist()
+    assert saved["commanded_offsets"] == [0.01] * 5
+    assert saved["mass_offsets"] == walk.mass_offsets.tolist()
+    assert saved["parameters"]["hip_width"] == 0.25
+
+
+def test_walk_is_saved_as_json_only(tmp_path):
+    walk = Walker(WalkerParameters()).walk(1, state=[0.0, 0.155, -0.004, -0.42, -0.07])
+    with pytest.raises(ValueError, match=r"must end with one of \.json"):
+        walk.save(tmp_path / "walk.csv")
