@@ -28,7 +28,6 @@ from agents.policies import storage
 from agents.settings import all_settings
 from agents.shipping import ship
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.registration import TASK_VERSIONS
 
 ID = "LeanYaw/Heading-v0"
 TINY = PPOSettings(
