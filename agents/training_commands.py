@@ -26,7 +26,9 @@ def train(
     jobs: Annotated[int, typer.Option(min=1, help="Number of processes for several seeds.")] = 1,
     algorithm: Annotated[
         str | None,
-        typer.Option(help="ppo, sac, apg or, for WaypointGoal, her; ppo otherwise.", show_default=False),
+        typer.Option(
+            help="ppo, sac, apg or, for WaypointGoal, her; ppo otherwise.", show_default=False
+        ),
     ] = None,
     steps: Annotated[
         int | None,

@@ -260,11 +260,21 @@ def test_the_policy_taken_from_a_training_acts_as_the_trained_network(tmp_path):
     assert trained.policy.predict(observation)[0] == pytest.approx(signal, abs=1e-5)
 
 
+OTHERS = "cmaes matplotlib moviepy optuna PIL pygame rich safetensors stable_baselines3 sympy torch tqdm typer xarray"
+"""Libraries of the package's extras."""
+CORE_ALONE = f"""
+import sys
+class Missing:
+    def find_spec(name, path=None, target=None):
+        if name.partition(".")[0] in {OTHERS.split()!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Missing)
+"""
+
+
 def core_alone(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run a program as where only the core's dependencies are installed."""
-    others = "cmaes matplotlib moviepy optuna PIL pygame rich safetensors stable_baselines3 sympy torch tqdm typer xarray"
-    block = f"import sys; sys.modules |= dict.fromkeys({others.split()!r})\n"
-    command = [sys.executable, "-c", block + program, *arguments]
+    command = [sys.executable, "-c", CORE_ALONE + program, *arguments]
     return subprocess.run(command, cwd=Path(__file__).parents[1], capture_output=True, text=True)
 
 
