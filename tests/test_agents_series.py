@@ -15,6 +15,7 @@ import train
 from agents.learning import series
 from agents.learning.curves import running_means
 from agents.learning.recorder import TrainingLog
+from agents.learning.runs import Training, is_finished, new_run, read_log
 from agents.learning.series import (
     RunError,
     new_series,
@@ -25,8 +26,7 @@ from agents.learning.series import (
     runs_of,
     seeds_table,
 )
-from agents.learning.training import Training, is_finished, new_run, read_log
-from agents.policies import storage
+from agents.policies import policy_files
 from agents.registry import newest_policy
 from agents.shipping import ship
 
@@ -112,9 +112,9 @@ def test_a_series_goes_on_with_what_is_unfinished_and_gathers_its_seeds(tmp_path
         assert next(csv.reader(file)) == ["metric", "median", "lowest", "highest", "seed0", "seed3"]
     assert (folder / "learning_curves.png").stat().st_size > 0
     assert newest_policy("LeanYaw/Walk-v0", tmp_path) == runs[3]
-    monkeypatch.setattr(storage, "SHIPPED", tmp_path / "trained")
+    monkeypatch.setattr(policy_files, "SHIPPED", tmp_path / "trained")
     ship(folder)
-    assert storage.shipped_seeds("LeanYaw/Walk-v0") == [0, 3]
+    assert policy_files.shipped_seeds("LeanYaw/Walk-v0") == [0, 3]
 
 
 def test_the_newest_of_runs_and_series_is_gone_on_with(tmp_path):
