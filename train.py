@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from agents.command_line import train
+from agents.training_commands import train
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 app.command()(train)

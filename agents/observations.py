@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lean_yaw_env.envs.goal_env import seen_from_walker
+from lean_yaw_env.envs.observation import (
+    COMMON_CENTRES,
+    COMMON_NAMES,
+    COMMON_SCALES,
+    STANCE_FOOT,
+)
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
-from lean_yaw_env.envs.transition import OFFSET_SCALE, STATE_CENTRES, STATE_SCALES
-from lean_yaw_env.parameters import STATE_FIELDS
 
-_CENTRES = dict(zip((field.name for field in STATE_FIELDS), STATE_CENTRES, strict=True))
-_SCALES = dict(zip((field.name for field in STATE_FIELDS), STATE_SCALES, strict=True))
-_CENTRES |= {"mass_offset": 0.0, "stance_foot": 0.0}
-_SCALES |= {"mass_offset": OFFSET_SCALE, "stance_foot": 1.0}
+_CENTRES = dict(zip(COMMON_NAMES, COMMON_CENTRES, strict=True))
+_SCALES = dict(zip(COMMON_NAMES, COMMON_SCALES, strict=True))
 
 
 @dataclass(frozen=True)
@@ -44,16 +48,20 @@ class ObservationLayout:
                 raise ValueError(
                     f"task must be one that shows {name}, got {task!r}, which shows {', '.join(names)}"
                 )
-        centres = _CENTRES | {feature.name: feature.centre for feature in made.features}
-        scales = _SCALES | {feature.name: feature.scale for feature in made.features}
+        centres = _CENTRES | {feature.name: feature.centre for feature in made.observed}
+        scales = _SCALES | {feature.name: feature.scale for feature in made.observed}
         return cls(
             names,
             tuple(centres[name] for name in names),
             tuple(scales[name] for name in names),
         )
 
-    def require(self, observation: ArrayLike) -> NDArray[np.float32]:
-        """The observation as an array of shape (..., features), or ``ValueError``."""
+    def require(self, observation: ArrayLike | Mapping[str, Any]) -> NDArray[np.float32]:
+        """The observation as an array of shape (..., features), or ``ValueError``; that of ``WaypointGoalEnv`` as seen from the walker."""
+        if isinstance(observation, Mapping):
+            observation = seen_from_walker(
+                observation, mirror=COMMON_NAMES[STANCE_FOOT] not in self.names
+            )
         array = np.asarray(observation, dtype=np.float32)
         if array.ndim == 0 or array.shape[-1] != len(self.names):
             raise ValueError(

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.files import read_json
-from lean_yaw_env.registration import ENV_IDS, GOAL_ENV_ID, TASK_VERSIONS
+from lean_yaw_env.registration import ALL_ENV_IDS, ALL_TASKS, GOAL_TASK, TASK_VERSIONS
 from lean_yaw_env.rendering.palette import AGENT_COLOURS, INK, unit_colour
 from lean_yaw_env.validation import require_choice
 
@@ -67,11 +67,17 @@ class AgentEntry:
 
     kind: Kind
     make: Callable[[AgentRequest], Agent]
-    tasks: tuple[str, ...] = tuple(TASK_VERSIONS)
+    tasks: tuple[str, ...] = ALL_TASKS
 
 
 def _feedback(request: AgentRequest) -> Agent:
     return HeadingFeedback(task_of(request.env_id), request.options)
+
+
+def _lqr(request: AgentRequest) -> Agent:
+    task = task_of(request.env_id)
+    # the same observations, and the settings tuned for more than one goal
+    return guided("Waypoint" if task == GOAL_TASK else task, request.options)
 
 
 def _mpc(request: AgentRequest) -> Agent:
@@ -93,11 +99,12 @@ AGENTS: dict[str, AgentEntry] = {
     "random": AgentEntry("baseline", lambda request: RandomController(request.seed)),
     "fixed": AgentEntry("baseline", lambda request: FixedController()),
     "feedback": AgentEntry("feedback", _feedback, ("Heading", "SpeedHeading", "UTurn", "Level")),
-    "lqr": AgentEntry("feedback", lambda request: guided(task_of(request.env_id), request.options)),
-    "mpc": AgentEntry("planner", _mpc),
+    "lqr": AgentEntry("feedback", _lqr),
+    "mpc": AgentEntry("planner", _mpc, tuple(TASK_VERSIONS)),
     "ppo": AgentEntry("learned", _trained("ppo")),
     "sac": AgentEntry("learned", _trained("sac")),
     "apg": AgentEntry("learned", _trained("apg")),
+    "her": AgentEntry("learned", _trained("her"), (GOAL_TASK,)),
 }
 """Every agent, in the order of tables; a learned one has the name of its algorithm."""
 
@@ -170,13 +177,8 @@ def policy_folders(algorithm: str, request: AgentRequest) -> list[Path]:
 
 def env_id_of(task: str) -> str:
     """The environment's id for a task's name, or ``ValueError``."""
-    if task == task_of(GOAL_ENV_ID):
-        raise ValueError(
-            f"task must be one whose observations are arrays, got {task!r}: its observations are dictionaries for goal-conditioned learners, "
-            f"as Stable-Baselines3's SAC with HerReplayBuffer on gym.make({GOAL_ENV_ID!r}); Waypoint is the same task for agents of this package"
-        )
-    require_choice("task", task, TASK_VERSIONS)
-    return next(env_id for env_id in ENV_IDS if task_of(env_id) == task)
+    require_choice("task", task, ALL_TASKS)
+    return next(env_id for env_id in ALL_ENV_IDS if task_of(env_id) == task)
 
 
 def newest_policy(env_id: str, runs: Path, algorithm: str = DEFAULT_ALGORITHM) -> Path | None:

@@ -15,6 +15,7 @@ from gymnasium.vector import VectorEnv
 
 from benchmarks.measure import FULL, SMALLEST, Effort, Timings, measure
 from benchmarks.measurements import Measurement, command_line
+from lean_yaw_env.envs.dynamics import OUTCOME_SIZE
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.kernel.batch import step_batch
 
@@ -70,9 +71,14 @@ def walkers(n: int, **options: Any) -> WalkerVectorEnv:
 
 def kernel_alone(env: WalkerVectorEnv) -> Callable[[], None]:
     """The batch kernel on the very walkers that the environment has stepped last."""
-    rows = env.rows
-    outcomes = np.empty_like(rows.outcomes)
-    return lambda: step_batch(rows.bodies, *rows.kernel_rows, outcomes, 0, rows.n)
+    simulation = env.simulation
+    walkers, n = simulation.walkers, simulation.n
+    commands = np.column_stack(
+        [walkers[name] for name in ("inter_leg_angle", "commanded_offset", "mass_offset")]
+    )
+    states, sides = simulation.states.copy(), walkers["side"].copy()
+    outcomes = np.empty((n, OUTCOME_SIZE))
+    return lambda: step_batch(simulation.bodies, commands, states, sides, outcomes, 0, n)
 
 
 def _single(effort: Effort, steps: int) -> list[Measurement]:

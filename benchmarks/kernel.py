@@ -18,10 +18,9 @@ from benchmarks.scipy_step import ScipyStep
 from lean_yaw_env import Walker
 from lean_yaw_env.analysis.limit_cycle import find_gait
 from lean_yaw_env.kernel.batch import step_batch
-from lean_yaw_env.kernel.jacobian import INPUTS, step_jacobian
+from lean_yaw_env.kernel.jacobian import step_jacobian
 from lean_yaw_env.kernel.records import Body, Command, Outcome
 from lean_yaw_env.kernel.step import step
-from lean_yaw_env.parameters import STATE_SIZE
 from lean_yaw_env.threads import share_out
 
 WALKERS = 4096
@@ -54,9 +53,8 @@ def single_jacobian(population: Population) -> Callable[[], object]:
     """A call for the exact derivatives of the same step."""
     body = Body(*population.bodies[0].tolist())
     command = Command(*population.commands[0].tolist())
-    gait = find_gait(Walker()).tolist()
-    after, jacobian = np.empty(STATE_SIZE), np.empty((STATE_SIZE, INPUTS))
-    return lambda: step_jacobian(body, command, *gait, 1.0, after, jacobian)
+    gait = find_gait(Walker())
+    return lambda: step_jacobian(body, command, gait, 1.0, inputs=8)
 
 
 def _cases(resting: Population, moving: Population) -> dict[str, Callable[[], object]]:

@@ -70,4 +70,4 @@ def strike(time, y, body, command, heading, side, outcome):
         time, y[0], y[1], y[2], y[3], 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0,
         LANDING, y[0], y[1], energy,
     )  # fmt: skip
-    write_outcome(finish(stance, heading, flight), outcome)
+    write_outcome(finish(stance, flight), outcome)

@@ -18,10 +18,26 @@ TASK_VERSIONS = {
 }
 """Every task's name and version; the module of the same name in ``envs.tasks`` defines it."""
 
+REWARD_THRESHOLDS = {
+    "Heading": 184.0,
+    "Walk": 200.0,
+    "SpeedHeading": 164.0,
+    "Slalom": 164.0,
+    "UTurn": 151.0,
+    "Level": 179.0,
+}
+"""The mean return from which a task counts as solved: what the best feedback controller earns on held-out episodes (docs/leaderboard.md).
+Other tasks are not judged by their return."""
+
 ENV_IDS = tuple(f"{NAMESPACE}/{name}-v{version}" for name, version in TASK_VERSIONS.items())
 
-GOAL_ENV_ID = f"{NAMESPACE}/WaypointGoal-v0"
-"""Waypoint for goal-conditioned learners: the one environment whose observations are dictionaries."""
+GOAL_TASK = "WaypointGoal"
+"""Waypoint with one goal, paid for reaching it alone."""
+GOAL_ENV_ID = f"{NAMESPACE}/{GOAL_TASK}-v0"
+"""That task for goal-conditioned learners: the one environment whose observations are dictionaries."""
+
+ALL_TASKS = (*TASK_VERSIONS, GOAL_TASK)
+ALL_ENV_IDS = (*ENV_IDS, GOAL_ENV_ID)
 
 TASK_IDS: dict[str, str] = {}
 """The name of the task of each registered id."""
@@ -47,7 +63,8 @@ def register_id(env_id: str, task: str, *, reward_threshold: float | None = None
 def register_envs() -> None:
     """Register every environment that is not registered yet; calling it again does nothing."""
     for name, env_id in zip(TASK_VERSIONS, ENV_IDS, strict=True):
-        register_id(env_id, name)
+        register_id(env_id, name, reward_threshold=REWARD_THRESHOLDS.get(name))
+    TASK_IDS[GOAL_ENV_ID] = GOAL_TASK
     if GOAL_ENV_ID not in registry:
         register(
             id=GOAL_ENV_ID,

@@ -25,9 +25,9 @@ from agents.controllers.schedule import GainSchedule, LqrWeights, last_turn, per
 from agents.evaluation.scoring import run_episodes
 from agents.observations import ObservationLayout
 from lean_yaw_env import Walker, WalkerParameters
+from lean_yaw_env.analysis.active_map import ActiveMap
 from lean_yaw_env.analysis.fixed_point import solve_fixed_point
 from lean_yaw_env.analysis.limit_cycle import cycle_at, find_gait
-from lean_yaw_env.analysis.section_map import ActiveMap
 from lean_yaw_env.envs.options import EnvOptions, gait_of
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.errors import NoGaitError
@@ -66,6 +66,31 @@ def test_the_linear_step_is_the_limit_of_small_differences(walker, gait):
         ahead = mirrored_step(walker, gait, 0.0, 0.3 + angle, change)
         back = mirrored_step(walker, gait, 0.0, 0.3 - angle, -change)
         assert np.allclose(step.by_input[:, column], (ahead - back) / (2.0 * small), atol=2e-6)
+
+
+@pytest.mark.parametrize("offsets", [(0.0, 0.0), (0.02, -0.015)])
+def test_the_speed_s_derivatives_are_the_limit_of_small_differences(walker, gait, offsets):
+    start, (before, change) = gait + 0.2 * np.eye(5)[0], offsets
+    exact = linearise_step(walker, start, 0.3, before + change, before).speed
+
+    def speed(point):
+        step = walker.step(
+            point[:5],
+            previous_offset=point[5],
+            inter_leg_angle=point[6],
+            mass_offset=point[5] + point[7],
+        )
+        heading = 0.5 * (point[0] + step.state[0])
+        along = step.displacement @ [math.cos(heading), -math.sin(heading)]
+        return along / step.duration
+
+    middle, small = np.array([*start, before, 0.3, change]), 1e-6
+    differences = [
+        (speed(middle + nudge) - speed(middle - nudge)) / (2.0 * small)
+        for nudge in small * np.eye(8)
+    ]
+    # small^2 times the third derivative, and round-off of 1e-13 / small
+    assert exact == pytest.approx(differences, abs=1e-7)
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.3, -0.6])

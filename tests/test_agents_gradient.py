@@ -13,19 +13,21 @@ from agents import load, save
 from agents.controllers.simple import FixedController
 from agents.evaluation.scoring import run_seeds
 from agents.learning.algorithms import settings_for, train
-from agents.learning.gradient import walkers as walkers_module
-from agents.learning.gradient.differentiation import bounded
-from agents.learning.gradient.learner import GradientSettings
-from agents.learning.gradient.networks import make_policy
-from agents.learning.gradient.returns import Window, time_discounted_returns
-from agents.learning.gradient.tasks import FORMULAS
-from agents.learning.gradient.walkers import DifferentiableWalkers
+from agents.learning.apg import GradientSettings, make_policy
+from agents.learning.differentiable import (
+    DifferentiableWalkers,
+    Window,
+    bounded,
+    time_discounted_returns,
+)
 from agents.learning.recorder import CheckpointError
 from agents.seeds import TUNING_SEEDS
+from lean_yaw_env.envs.linearised import LinearisedSteps
 from lean_yaw_env.envs.options import EnvOptions, gait_of
+from lean_yaw_env.envs.state import WALKER
+from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.kernel.batch import step_batch
-from lean_yaw_env.kernel.jacobian import INPUTS, OUTPUTS
-from lean_yaw_env.kernel.jacobians import step_jacobians
+from lean_yaw_env.kernel.jacobian import OUTPUTS, step_jacobians
 from lean_yaw_env.kernel.records import STEPPED, Outcome
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.registration import TASK_VERSIONS
@@ -67,7 +69,7 @@ def test_derivatives_of_all_that_rewards_are_made_of_agree_with_differences(shif
         return outcomes[:, columns], outcomes[:, Outcome._fields.index("status")]
 
     statuses, afters = np.empty(n), np.empty((n, 5))
-    jacobians = np.empty((n, len(OUTPUTS), INPUTS))
+    jacobians = np.empty((n, len(OUTPUTS), 8))
     step_jacobians(
         body, inputs[:, 5:].copy(), inputs[:, :5].copy(), sides, statuses, afters, jacobians, 0, n
     )
@@ -76,8 +78,8 @@ def test_derivatives_of_all_that_rewards_are_made_of_agree_with_differences(shif
     assert stepped.mean() > 0.8
     assert (afters[stepped] == values[stepped, :5]).all()
     h = 1e-6
-    for k in range(INPUTS):
-        shift = np.zeros(INPUTS)
+    for k in range(8):
+        shift = np.zeros(8)
         shift[k] = h
         (ahead, first), (behind, second) = outputs(inputs + shift), outputs(inputs - shift)
         same = stepped & (first == STEPPED) & (second == STEPPED)
@@ -102,7 +104,7 @@ def walked_total(task, actions, options):
 OPTIONS = [("Heading", EnvOptions(random_body="training")), ("SpeedHeading", EnvOptions(sensor_noise=0.1, hidden_rates=True))]  # fmt: skip
 
 
-@pytest.mark.parametrize(("task", "options"), [*((task, EnvOptions()) for task in FORMULAS), *OPTIONS])  # fmt: skip
+@pytest.mark.parametrize(("task", "options"), [*((task, EnvOptions()) for task in TASK_VERSIONS), *OPTIONS])  # fmt: skip
 def test_gradient_through_a_window_of_a_task_agrees_with_central_differences(task, options):
     generator = torch.Generator().manual_seed(0)
     spread = 0.02 * torch.tensor([4.0, 1.0])  # gentle enough for the limit of the offset's change
@@ -183,33 +185,70 @@ def test_bound_gives_descent_the_way_back_in_and_no_way_further_out():
 # --- one truth: the environment's
 
 
-@pytest.mark.parametrize("mirror", [True, False])
-@pytest.mark.parametrize("task", FORMULAS)
-def test_formulas_equal_the_environment_s_rewards_and_observations(task, mirror, monkeypatch):
-    pairs = []
-
-    def noted(formula, values):
-        pairs.append((formula.detach(), values))
-        return formula + (values - formula).detach()
-
-    monkeypatch.setattr(walkers_module, "_valued", noted)
-    options = EnvOptions(mirror=mirror, push_level=0.5, start_disturbance=2.0, horizon=40.0)
+@pytest.mark.parametrize("task", TASK_VERSIONS)
+def test_what_gradients_flow_through_are_the_environment_s_own_numbers(task):
+    options = EnvOptions(push_level=0.5, start_disturbance=2.0, horizon=40.0, sensor_noise=0.1)
     walkers = DifferentiableWalkers(task, options, 16)
     walkers.reset(7)
+    twin = WalkerVectorEnv(16, task, autoreset_mode="Disabled", **vars(options))
+    twin.reset(seed=7)
     generator = torch.Generator().manual_seed(2)
     ends = 0
     for _ in range(80):
         actions = (0.6 * torch.randn(16, 2, generator=generator)).double()  # float32 numbers
         walked = walkers.step(actions)
-        lives = ~walked.terminated
-        (seen, shown), (reward, given) = pairs
-        pairs.clear()
-        # float32 numbers of up to 10
-        assert (seen - shown)[lives].abs().max() < 1e-6
-        # sums of a few numbers of order one
-        assert (reward - given).abs().max() < 1e-12
-        ends += int((walked.terminated | walked.truncated).sum())
+        seen, rewards, terminated, truncated, _ = twin.step(actions.numpy())
+        assert (walked.observations.numpy() == seen).all()
+        assert (walked.rewards.numpy() == rewards).all()
+        assert (walked.terminated.numpy() == terminated).all()
+        assert (walked.truncated.numpy() == truncated).all()
+        ended = terminated | truncated
+        if ended.any():
+            twin.reset(options={"reset_mask": ended})
+        ends += int(ended.sum())
     assert ends > 4
+
+
+@pytest.mark.parametrize("task", TASK_VERSIONS)
+def test_jacobians_of_steps_agree_with_differences_of_steps(task):
+    options = EnvOptions(push_level=0.2, mirror=False)
+    n = 32
+    env = WalkerVectorEnv(n, task, autoreset_mode="Disabled", **vars(options))
+    env.reset(seed=1)
+    simulation = env.simulation
+    linearised = LinearisedSteps(simulation)
+    zero = np.zeros((n, 2), np.float32)
+    for _ in range(3):
+        env.step(zero)
+    before, actions = env.get_state(), np.full((n, 2), [0.25, 0.0625], np.float32)
+
+    def stepped(name=None, shift=0.0):
+        """The outputs of a step from where a field is moved."""
+        env.set_state(before)
+        if name is not None:
+            records = simulation.walkers if name in WALKER.names else simulation.tasks
+            records[name] += shift
+        linearised.prepare()
+        seen, rewards, *_ = env.step(actions)
+        durations = simulation.walkers["duration"]
+        return np.column_stack([linearised.values(), seen, rewards, durations])
+
+    stepped()
+    jacobians, walks = linearised.jacobians(), ~simulation.terminated
+    assert walks.mean() > 0.8
+    h = 1e-5
+    exact = [k for k, name in enumerate(linearised.outputs) if k < len(linearised.followed)]
+    exact += [len(linearised.outputs) - 2, len(linearised.outputs) - 1]
+    observed = range(len(linearised.followed), len(linearised.outputs) - 2)
+    for column, name in enumerate(linearised.followed):
+        if name == "mass_offset":
+            continue  # the command moves with it, within the largest change
+        difference = (stepped(name, h) - stepped(name, -h)) / (2.0 * h)
+        error = np.abs(difference - jacobians[:, :, column])[walks & ~simulation.terminated]
+        # the integrator's tolerance of 1e-10 over 2 h, and h^2 times third derivatives of order 1e4
+        assert error[:, exact].max() < 1e-4, name
+        # observations are float32: up to 10, rounded to 5e-7, over h
+        assert error[:, observed].max() < 0.1, name
 
 
 # --- returns
@@ -284,6 +323,13 @@ def test_training_is_decided_by_its_seed():
         assert (weights == again.policy.weights[name]).all()
     assert (first.log.returns == again.log.returns).all()
     assert (first.policy.weights["layers.0.weight"] != other.policy.weights["layers.0.weight"]).any()  # fmt: skip
+
+
+def test_a_training_logs_each_of_its_episodes_by_itself():
+    log = trained().log
+    # every step belongs to one episode, and some are not over when the training is
+    assert 0 < log.lengths.sum() <= TINY.steps
+    assert len(log.lengths) > TINY.walkers
 
 
 def test_interrupted_training_goes_on_bit_for_bit(tmp_path: Path):

@@ -38,7 +38,7 @@ def started(task, n=WALKERS, seed=TUNING_SEEDS, steps=5, **options):
 def decide(env, task, settings=TINY, seed=0, **options):
     agent = MpcController(task, EnvOptions(**options), settings, seed, FixedController())
     agent.attach(env)
-    return agent.predict(env.rows.observations)[0]
+    return agent.predict(env.simulation.observations)[0]
 
 
 @pytest.mark.parametrize("body", [None, "training"])
@@ -47,14 +47,14 @@ def test_a_plan_is_worth_the_reward_that_the_environment_gives_for_it(body):
     env = started("Slalom", **options)
     settings = replace(TINY, window=30.0)
     plans = np.random.default_rng(1).uniform(-0.4, 0.4, (WALKERS, 1, 8, 2))
-    rollouts = Rollouts(env.rows, settings, FixedController(), 0)
+    rollouts = Rollouts(env.simulation, settings, FixedController(), 0)
     worth = rollouts.worth(plans, np.arange(WALKERS))[:, 0]
-    rewards, times = [], [env.rows.memory[:, 8].copy()]
+    rewards, times = [], [env.simulation.walkers["time"].copy()]
     for step in range(8):
         actions = plans[:, 0, step].astype(np.float32)
-        actions[:, 1] *= env.rows.memory[:, 5]
+        actions[:, 1] *= env.simulation.walkers["side"]
         rewards.append(env.step(actions)[1])
-        times.append(env.rows.memory[:, 8].copy())
+        times.append(env.simulation.walkers["time"].copy())
     rate = (rewards[-1] + rewards[-2]) / (times[-1] - times[-3])
     expected = sum(rewards) + rate * (30.0 - (times[-1] - times[0]))
     # the same steps from the same numbers; only the sums are in another order
@@ -63,11 +63,11 @@ def test_a_plan_is_worth_the_reward_that_the_environment_gives_for_it(body):
 
 def test_nothing_of_the_environment_changes_by_planning():
     env = started("Waypoint")
-    arrays = ("memory", "stream", "observations", "actions", "outcomes", "rewards")
-    before = {name: getattr(env.rows, name).copy() for name in arrays}
+    arrays = ("walkers", "tasks", "observations", "actions", "rewards", "ends")
+    before = {name: getattr(env.simulation, name).copy() for name in arrays}
     decide(env, "Waypoint")
     for name in arrays:
-        np.testing.assert_array_equal(getattr(env.rows, name), before[name])
+        np.testing.assert_array_equal(getattr(env.simulation, name), before[name])
 
 
 @pytest.mark.parametrize("task", ["Heading", "Waypoint", "Slalom", "Push"])
@@ -75,7 +75,7 @@ def test_decisions_do_not_depend_on_what_the_episode_will_draw(task):
     env = started(task)
     settings = replace(TINY, scenarios=2) if task == "Push" else TINY
     before = decide(env, task, settings)
-    env.rows.stream[:] = np.random.default_rng(2).integers(2**60, size=env.rows.stream.shape)
+    env.simulation.walkers["key"] = np.random.default_rng(2).integers(2**60, size=WALKERS)
     np.testing.assert_array_equal(decide(env, task, settings), before)
 
 
@@ -86,10 +86,10 @@ def test_a_walker_decides_alone_as_among_others_and_the_same_for_a_seed():
     assert np.any(decide(env, "Slalom", seed=4) != together)
     alone = WalkerEnv("Slalom")
     alone.reset(seed=0)
-    alone.rows.memory[0] = env.rows.memory[1]
+    alone.simulation.take_over(env.simulation, np.array([1]))
     agent = MpcController("Slalom", settings=TINY, seed=3, base=FixedController())
     agent.attach(alone)
-    action, _ = agent.predict(alone.rows.observations[0])
+    action, _ = agent.predict(alone.simulation.observations[0])
     assert action.shape == (2,)
     np.testing.assert_array_equal(action, together[1])
 
@@ -97,7 +97,7 @@ def test_a_walker_decides_alone_as_among_others_and_the_same_for_a_seed():
 def test_decisions_are_the_same_in_space_whether_observations_are_mirrored_or_not():
     mirrored, raw = started("Heading", steps=0), started("Heading", steps=0, mirror=False)
     actions = decide(mirrored, "Heading")
-    actions[:, 1] *= mirrored.rows.memory[:, 5].astype(np.float32)
+    actions[:, 1] *= mirrored.simulation.walkers["side"].astype(np.float32)
     # single precision: an action is rounded before or after its sign is turned, which is exact
     np.testing.assert_array_equal(decide(raw, "Heading", mirror=False), actions)
 
@@ -113,7 +113,9 @@ def test_the_base_acts_where_no_plan_is_better_by_the_margin():
     env = started("Slalom")
     # no plan is better by more than a walker earns
     actions = decide(env, "Slalom", replace(TINY, margin=1e6))
-    np.testing.assert_array_equal(actions, FixedController().predict(env.rows.observations)[0])
+    np.testing.assert_array_equal(
+        actions, FixedController().predict(env.simulation.observations)[0]
+    )
     assert np.all(decide(env, "Slalom", replace(TINY, margin=0.0)) != actions)
 
 
@@ -160,7 +162,7 @@ def test_the_planner_of_that_name_plans_around_the_regulator():
     named = MpcController("Push", options, base=regulator)
     for each in (planner, named):
         each.attach(env)
-    actions = [each.predict(env.rows.observations)[0] for each in (planner, named)]
+    actions = [each.predict(env.simulation.observations)[0] for each in (planner, named)]
     np.testing.assert_array_equal(actions[0], actions[1])
 
 
@@ -207,13 +209,13 @@ def test_planning_needs_the_environment_that_it_is_for():
     planner = MpcController("Heading", settings=TINY, base=FixedController())
     env = started("Heading", steps=0)
     with pytest.raises(RuntimeError, match="attach"):
-        planner.predict(env.rows.observations)
+        planner.predict(env.simulation.observations)
     with pytest.raises(ValueError, match="task"):
         planner.attach(started("Walk", steps=0))
     with pytest.raises(ValueError, match="options"):
         planner.attach(started("Heading", steps=0, action_delay=True))
     planner.attach(env)
     with pytest.raises(ValueError, match="3 walkers"):
-        planner.predict(env.rows.observations[:2])
+        planner.predict(env.simulation.observations[:2])
     with pytest.raises(ValueError, match="seed"):
         MpcController("Heading", seed=-1)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import pickle
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -256,3 +258,48 @@ def test_the_policy_taken_from_a_training_acts_as_the_trained_network(tmp_path):
         signal = np.tanh(signal) if k < 2 else np.clip(signal, -1.0, 1.0)
     # float32 against float64
     assert trained.policy.predict(observation)[0] == pytest.approx(signal, abs=1e-5)
+
+
+OTHERS = "cmaes matplotlib moviepy optuna PIL pygame rich safetensors stable_baselines3 sympy torch tqdm typer xarray"
+"""Libraries of the package's extras."""
+CORE_ALONE = f"""
+import sys
+class Missing:
+    def find_spec(name, path=None, target=None):
+        if name.partition(".")[0] in {OTHERS.split()!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Missing)
+"""
+
+
+def core_alone(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run a program as where only the core's dependencies are installed."""
+    command = [sys.executable, "-c", CORE_ALONE + program, *arguments]
+    return subprocess.run(command, cwd=Path(__file__).parents[1], capture_output=True, text=True)
+
+
+def test_the_core_alone_runs_controllers_and_says_what_policies_need():
+    program = """
+from agents import AgentRequest, FixedController, load, make_agent
+from agents.evaluation.scoring import run_episodes
+from lean_yaw_env.envs.options import EnvOptions
+short = EnvOptions(horizon=3.0)
+for agent in (FixedController(), make_agent("lqr", AgentRequest("LeanYaw/Walk-v0", short))):
+    print(run_episodes(agent, "Walk", episodes=1, options=short).survived)
+try:
+    load("LeanYaw/Walk-v0")
+except ImportError as error:
+    print(error)
+"""
+    done = core_alone(program)
+    assert done.returncode == 0, done.stderr
+    hint = "safetensors is not installed, run `pip install 'lean-yaw-env[agents]'`"
+    assert done.stdout.splitlines() == ["[ True]", "[ True]", hint]
+
+
+def test_the_command_line_says_what_it_needs():
+    program = "import runpy; runpy.run_module('agents', run_name='__main__')"
+    done = core_alone(program, "--help")
+    assert done.returncode == 1
+    hint = "agents: typer is not installed, run `pip install 'lean-yaw-env[train]'`"
+    assert done.stderr.strip() == hint

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from lean_yaw_env.analysis import (
+    attraction,
     basin,
     find_limit_cycle,
     gait_map,
     largest_disturbance,
+    load_dataset,
     load_map,
     save_map,
     section_map_of,
@@ -78,6 +80,25 @@ def test_map_of_pumping_spreads_from_one_gait_to_where_the_slope_gives_nothing()
     assert np.isnan(float(here.eigenvalue_real[-1]))  # the heading has no multiplier there
 
 
+def test_map_of_turning_walkers_has_the_speed_of_both_feet() -> None:
+    walker = Walker(WalkerParameters(slope_turns=True))
+    result = stability_map(walker, {"mass_offset": np.linspace(-0.05, 0.05, 9)})
+    cycle = find_limit_cycle(walker, mass_offset=0.05)
+    for name in ("speed", "step_length", "gravity_work"):
+        ends = result[name].to_numpy()[[0, -1]]
+        assert ends == pytest.approx([getattr(cycle, name)] * 2, abs=1e-9)
+
+
+def test_map_goes_to_the_fold_and_not_round_it() -> None:
+    # at an ankle tilt of 0.8 the gait folds at a hip width between 0.38 and 0.42; past the fold it would be slower by a half
+    widths = np.linspace(0.3, 0.45, 16)
+    result = stability_map(Walker(WalkerParameters(ankle_tilt=0.8)), {"hip_width": widths})
+    found = (result.status == 1).to_numpy()
+    assert found[0] and not found[-1] and (np.diff(found.astype(int)) <= 0).all()
+    speeds = result.speed.to_numpy()[found]
+    assert speeds.min() > 0.7 * speeds.max()
+
+
 def test_map_of_passive_walkers_reproduces_figure_8() -> None:
     walker = PassiveWalker(WalkerParameters(0.0, 0.5, 0.15, 0.00058))
     result = stability_map(walker, {"ankle_tilt": [0.14, 0.15, 0.152, 0.154, 0.16]})
@@ -109,6 +130,27 @@ def test_interrupted_map_goes_on_where_it_was(tmp_path: Path, monkeypatch) -> No
     # other batches, other neighbours in a vector: bit for bit the same all the same
     assert resumed.equals(whole)
     assert [p.name for p in tmp_path.iterdir()] == ["map.nc"]
+
+
+def test_what_is_done_is_kept_when_work_ends_in_an_error(tmp_path: Path, monkeypatch) -> None:
+    path = tmp_path / "basin.nc"
+    arguments = (TABLE_1, ("heading", [-0.1, 0.0, 0.1]), ("ankle_rate", [-0.1, 0.0]))
+    whole = basin(*arguments, n_steps=5)
+    monkeypatch.setattr(attraction, "_CHUNK", 4)
+    walk, calls = attraction.walk_many, []
+
+    def full_disk(*given):
+        calls.append(given)
+        if len(calls) == 2:
+            raise OSError("no space left on device")
+        return walk(*given)
+
+    monkeypatch.setattr(attraction, "walk_many", full_disk)
+    with pytest.raises(OSError, match="no space left"):
+        basin(*arguments, n_steps=5, path=path)
+    assert int((load_dataset(path).ending >= 0.0).sum()) == 4
+    assert basin(*arguments, n_steps=5, path=path).identical(whole)
+    assert [len(given[1]) for given in calls[1:]] == [2, 2]
 
 
 def test_map_saves_and_loads_and_another_question_is_refused(tmp_path: Path) -> None:

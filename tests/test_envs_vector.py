@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import copy
 import multiprocessing
 import pickle
+import warnings
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pytest
+import torch
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 from numpy.typing import NDArray
 
 from lean_yaw_env import WalkerParameters
+from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.envs.walker_env import WalkerEnv
 
@@ -164,13 +169,102 @@ def _mode(name: str) -> AutoresetMode:
     return {"next_step": AutoresetMode.NEXT_STEP, "same_step": AutoresetMode.SAME_STEP}[name]
 
 
-def test_without_step_info_only_the_infos_are_missing() -> None:
-    with_info = _run(autoreset_mode=AutoresetMode.SAME_STEP)
-    without = _run(autoreset_mode=AutoresetMode.SAME_STEP, step_info=False)
+@pytest.mark.parametrize("mode", ["next_step", "same_step"])
+def test_without_step_info_only_the_infos_are_missing(mode: str) -> None:
+    with_info = _run(autoreset_mode=_mode(mode))
+    without = _run(autoreset_mode=_mode(mode), step_info=False)
+    assert without[0][1] == {}  # neither at resets
     for full, short in zip(with_info[1:], without[1:], strict=True):
         assert _differences(short[:4], full[:4]) == []
-        final = {key: full[4][key] for key in full[4] if "final_" in key}
+        final = {key: full[4][key] for key in full[4] if "final_obs" in key}
         assert _differences(short[4], final) == []
+
+
+def test_the_info_of_an_ended_episode_has_the_keys_of_any_other() -> None:
+    seen = _run(autoreset_mode=AutoresetMode.SAME_STEP)
+    keys = set(seen[0][1])
+    finals = [info for *_, info in seen[1:] if "final_info" in info]
+    assert len(finals) > 5
+    for info in finals:
+        mask = info["_final_info"]
+        assert set(info) == keys | {"final_obs", "_final_obs", "final_info", "_final_info"}
+        assert set(info["final_info"]) == keys
+        assert (info["final_info"]["steps"][mask] > 0).all()
+        assert (info["steps"][mask] == 0).all()
+
+
+def test_infos_that_someone_keeps_are_not_overwritten() -> None:
+    env = WalkerVectorEnv(8, "Heading")
+    env.reset(seed=1)
+    actions = np.zeros((8, 2), np.float32)
+    times, slices, whole = [], [], []
+    for _ in range(20):
+        *_, info = env.step(actions)
+        times.append(info["time"])  # an array of it
+        slices.append(info["state"][2:, 1])  # a view of one
+        whole.append(info)
+        del info
+    expected = np.cumsum([info["duration"] for info in whole], axis=0)
+    assert np.allclose(times, expected, rtol=0.0, atol=1e-12)
+    assert len({part.tobytes() for part in slices}) == 20
+    assert [float(info["steps"][0]) for info in whole] == list(range(1, 21))
+
+
+def test_a_solver_s_failure_ends_one_walker_s_episode_and_changes_no_other() -> None:
+    env, untouched = (WalkerVectorEnv(N, "Heading", **RESTLESS) for _ in range(2))
+    for each in (env, untouched):
+        each.reset(seed=4)
+    rng = np.random.default_rng(0)
+    others = np.arange(N) != 2
+    for step in range(20):
+        actions = rng.uniform(-1, 1, (N, 2)).astype(np.float32)
+        if step == 1:
+            # no valid state makes the solver fail: a record that is not a number does
+            env.simulation.walkers["stance_pitch_rate"][2] = np.nan
+        ours, theirs = env.step(actions), untouched.step(actions)
+        if step == 1:
+            assert (ours[1][2], ours[2][2], ours[3][2]) == (0.0, True, False)
+            assert ours[4]["fall"][2] == FallCode.SOLVER
+        for a, b in zip(ours[:4], theirs[:4], strict=True):
+            assert (a[others] == b[others]).all()
+        for key in ours[4]:
+            assert (ours[4][key][others] == theirs[4][key][others]).all()
+    assert env.simulation.solver_failures == 1
+    assert np.isfinite(ours[0]).all()  # it has begun another episode
+
+
+@pytest.mark.parametrize("mode", ["next_step", "same_step"])
+@pytest.mark.parametrize("how", ["deepcopy", "pickle", "set_state", "another's set_state"])
+def test_copied_episodes_go_on_bit_for_bit(how: str, mode: str) -> None:
+    options = {**RESTLESS, "sensor_noise": 0.1, "random_body": "training", "push_level": 0.2}
+    env = WalkerVectorEnv(16, "Slalom", autoreset_mode=_mode(mode), **options)
+    env.reset(seed=5)
+    actions = np.random.default_rng(1).uniform(-0.5, 0.5, (103, 16, 2)).astype(np.float32)
+    for action in actions[:3]:
+        env.step(action)
+    state, other = env.get_state(), env
+    if how == "another's set_state":
+        other = WalkerVectorEnv(16, "Slalom", autoreset_mode=_mode(mode), **options)
+    elif how != "set_state":
+        ways = {"deepcopy": copy.deepcopy}
+        other = ways.get(how, lambda each: pickle.loads(pickle.dumps(each)))(env)
+    expected = [env.step(action) for action in actions[3:]]
+    if "set_state" in how:
+        other.set_state(state)
+    assert _differences([other.step(action) for action in actions[3:]], expected) == []
+
+
+def test_steps_are_limited_as_gymnasium_limits_them() -> None:
+    ours = gym.make_vec("LeanYaw/Walk-v0", num_envs=2, max_episode_steps=5)
+    theirs = SyncVectorEnv([lambda: gym.make("LeanYaw/Walk-v0", max_episode_steps=5)] * 2)
+    assert _differences(ours.reset(seed=1), theirs.reset(seed=1)) == []
+    actions = np.zeros((2, 2), np.float32)
+    for _ in range(12):
+        assert _differences(ours.step(actions), theirs.step(actions)) == []
+    assert ours.spec is not None
+    assert ours.spec.kwargs["max_episode_steps"] == 5
+    with pytest.raises(ValueError, match="max_episode_steps must be from 1"):
+        gym.make_vec("LeanYaw/Walk-v0", num_envs=2, max_episode_steps=0)
 
 
 def test_observations_are_fresh_unless_asked_not_to_be() -> None:
@@ -255,12 +349,12 @@ def test_a_threaded_batch_works_in_a_forked_child() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"num_envs": 0}, r"num_envs must be in \[1, 1e\+07\], not 0"),
-        ({"threads": 0}, r"threads must be in \[1, 1024\], not 0"),
-        ({"render_mode": "rgb_array"}, "render_mode must be None for many walkers"),
+        ({"num_envs": 0}, "num_envs must be from 1 to 10000000, got 0"),
+        ({"threads": 0}, "threads must be from 1 to 1024, got 0"),
+        ({"render_mode": "human"}, "render_mode must be one of rgb_array, got 'human'"),
         ({"autoreset_mode": "never"}, "'never' is not a valid AutoresetMode"),
         ({"task": "Swim"}, "task must be one of"),
-        ({"mirror": 1}, "mirror must be True or False, not 1"),
+        ({"mirror": 1}, "mirror must be True or False, got 1"),
     ],
 )
 def test_a_bad_option_is_refused_by_name(options: dict[str, Any], message: str) -> None:
@@ -271,10 +365,10 @@ def test_a_bad_option_is_refused_by_name(options: dict[str, Any], message: str) 
 @pytest.mark.parametrize(
     ("actions", "message"),
     [
-        (np.zeros((3, 2)), r"actions must have shape \(4, 2\), not \(3, 2\)"),
-        (np.zeros((4, 3)), r"actions must have shape \(4, 2\), not \(4, 3\)"),
-        (np.zeros(8), r"not \(8,\)"),
-        (np.full((4, 2), np.nan), r"actions must be numbers in \[-1, 1\], not \[nan, nan\]"),
+        (np.zeros((3, 2)), r"actions must have shape \(4, 2\), got \(3, 2\)"),
+        (np.zeros((4, 3)), r"actions must have shape \(4, 2\), got \(4, 3\)"),
+        (np.zeros(8), r"got \(8,\)"),
+        (np.full((4, 2), np.nan), r"actions must be numbers in \[-1, 1\], got \[nan, nan\]"),
     ],
 )
 def test_bad_actions_are_refused_and_change_nothing(actions: Any, message: str) -> None:
@@ -290,7 +384,7 @@ def test_bad_actions_are_refused_and_change_nothing(actions: Any, message: str) 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"seed": [1, 2]}, "seed must be one number or 4 of them, not 2"),
+        ({"seed": [1, 2]}, "seed must be one number or 4 of them, got 2"),
         (
             {"options": {"reset_mask": [True] * 4}},
             r"reset_mask must be a bool array of shape \(4,\)",
@@ -323,3 +417,81 @@ def test_stepping_what_is_not_reset_is_refused() -> None:
         pass
     with pytest.raises(ResetNeeded, match=r"walkers \[.*\] have ended"):
         env.step(actions)
+
+
+# --- pictures
+
+
+def test_pictures_of_many_walkers_are_those_of_single_ones_in_small() -> None:
+    env = WalkerVectorEnv(3, "Waypoint", render_mode="rgb_array", horizon=3.0)
+    with pytest.raises(ResetNeeded, match="reset"):
+        env.render()
+    env.reset(seed=1)
+    frames = []
+    for _ in range(8):  # over an end and a start
+        env.step(np.zeros((3, 2), np.float32))
+        rendered = env.render()
+        assert rendered is not None
+        frames.append(rendered)
+    assert all(frame.shape == (360, 480, 3) for frame in frames[0])
+    assert all(frame.dtype == np.uint8 for frame in frames[0])
+    assert all((frame != other).any() for frame, other in zip(frames[0], frames[1], strict=True))
+    assert (frames[0][0] != frames[0][1]).any()
+
+
+def test_gymnasium_records_a_video_of_many_walkers(tmp_path: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the encoder's own
+        env = gym.wrappers.vector.RecordVideo(
+            gym.make_vec("LeanYaw/Heading-v0", num_envs=4, render_mode="rgb_array"),
+            str(tmp_path),
+            video_length=3,
+        )
+        env.reset(seed=1)
+        for _ in range(4):
+            env.step(np.zeros((4, 2), np.float32))
+        env.close()
+    (video,) = tmp_path.glob("*.mp4")
+    assert video.stat().st_size > 5_000
+
+
+def test_too_many_walkers_to_draw_are_refused() -> None:
+    with pytest.raises(ValueError, match="draws at most 64 walkers, got num_envs=65"):
+        WalkerVectorEnv(65, render_mode="rgb_array")
+    env = WalkerVectorEnv(2)
+    env.reset(seed=0)
+    with pytest.warns(UserWarning, match="make the environment with a render_mode"):
+        assert env.render() is None
+
+
+# --- Gymnasium's wrappers
+
+
+def test_tensors_share_the_arrays_memory() -> None:
+    pytest.importorskip("array_api_compat")
+    env = gym.wrappers.vector.NumpyToTorch(gym.make_vec("LeanYaw/Push-v0", num_envs=4))
+    observations, info = env.reset(seed=1)
+    assert observations.dtype == torch.float32
+    for _ in range(20):
+        observations, rewards, terminated, _, info = env.step(torch.zeros((4, 2)))
+    assert info["fall"].dtype == torch.int64
+    assert info["state"].shape == (4, 5)
+    assert rewards.dtype == torch.float64
+    assert terminated.dtype == torch.bool
+    lean = gym.wrappers.vector.NumpyToTorch(
+        gym.make_vec("LeanYaw/Push-v0", num_envs=4, copy=False, step_info=False)
+    )
+    observations, _ = lean.reset(seed=1)
+    own = lean.unwrapped
+    assert isinstance(own, WalkerVectorEnv)
+    assert observations.data_ptr() == own.simulation.observations.ctypes.data
+
+
+def test_arguments_for_other_vector_environments_are_refused_by_gymnasium_with_the_way_to_write_them() -> (
+    None
+):
+    with pytest.raises(gym.error.Error, match="only through kwargs"):
+        gym.make_vec("LeanYaw/Walk-v0", num_envs=2, vector_kwargs={"copy": False})
+    made = gym.make_vec("LeanYaw/Walk-v0", num_envs=2, copy=False).unwrapped
+    assert isinstance(made, WalkerVectorEnv)
+    assert made.copy is False

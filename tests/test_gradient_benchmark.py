@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from agents.learning.algorithms import train
-from agents.learning.gradient.learner import GradientSettings
+from agents.learning.apg import GradientSettings
 from agents.learning.ppo import PPOSettings
 from agents.learning.recorder import read_checkpoint
 from benchmarks.gradient import Curve, policy_in, save_comparison, table

@@ -38,7 +38,7 @@ import numpy as np
 from lean_yaw_env import Walker, WalkerParameters
 from lean_yaw_env.batch import step_batch
 from lean_yaw_env.kernel import step
-from lean_yaw_env.analysis.stride import differentiate_step
+from lean_yaw_env.analysis.step_derivatives import differentiate_step
 from lean_yaw_env.walker import require_command
 
 walker = Walker(WalkerParameters(ankle_stiffness=0.02, ankle_damping=0.01))
@@ -166,6 +166,6 @@ def test_importing_the_package_compiles_nothing_and_loads_no_compiler() -> None:
 
 def test_the_walker_compiles_without_its_environments() -> None:
     # what a script that only steps has to wait for
-    code = "import sys; from lean_yaw_env import Walker; print('lean_yaw_env.envs.running' in sys.modules)"
+    code = "import sys; from lean_yaw_env import Walker; print('lean_yaw_env.envs.dynamics' in sys.modules)"
     assert _run(code).strip() == "False"
     assert Walker().parameters.hip_width == 0.3

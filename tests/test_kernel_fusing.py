@@ -10,7 +10,6 @@ import pytest
 from numba import config, njit
 
 from lean_yaw_env.kernel.compilation import fused
-from lean_yaw_env.kernel.fusing import multiply_add
 
 compiled_only = pytest.mark.skipif(
     bool(config.DISABLE_JIT), reason="plain Python multiplies and adds, rounding twice"
@@ -58,9 +57,22 @@ def test_a_product_and_a_sum_are_rounded_once(
         assert call(a, b, c) == float(exact)
 
 
+def _product(a, b, c):
+    return a * b * c
+
+
 @compiled_only
-def test_a_fused_formula_of_complex_numbers_carries_the_derivative_and_the_same_real_part() -> None:
-    call = _called(_difference_last)
+@pytest.mark.parametrize(
+    ("formula", "slopes"),
+    [
+        (_difference_last, lambda a, b, c: (-b, -a, 1.0)),
+        (_product, lambda a, b, c: (b * c, a * c, a * b)),
+    ],
+)
+def test_a_fused_formula_of_complex_numbers_carries_the_derivative_and_the_same_real_part(
+    formula: Any, slopes: Any
+) -> None:
+    call = _called(formula)
     a, b, c = 0.3, 0.7, 0.2
     tiny = 1e-30
     for seeds in ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)):
@@ -69,13 +81,20 @@ def test_a_fused_formula_of_complex_numbers_carries_the_derivative_and_the_same_
         ]
         result = call(*arguments)
         assert result.real == call(a, b, c)
-        # c - a b: one product of each, correct to round-off
-        slope = -seeds[0] * b - seeds[1] * a + seeds[2]
+        # a sum of three products, correct to round-off
+        slope = np.dot(seeds, slopes(a, b, c))
         assert result.imag / tiny == pytest.approx(slope, rel=1e-15)
 
 
+@compiled_only
+def test_no_second_order_of_an_imaginary_part_reaches_a_real_one() -> None:
+    # with imaginary parts as large as the real ones, the product of complex numbers would be another
+    result = _called(_product)(0.3 + 1.0j, 0.7 + 1.0j, 0.2)
+    assert result.real == _called(_product)(0.3, 0.7, 0.2)
+
+
+@pytest.mark.skipif(
+    not config.DISABLE_JIT, reason="with the compiler a formula is not called from Python"
+)
 def test_without_the_compiler_a_formula_is_what_it_says() -> None:
-    formula = fused(_difference_last)
-    plain = getattr(formula, "py_func", formula)
-    assert plain(0.3, 0.7, 0.2) == pytest.approx(0.2 - 0.3 * 0.7, abs=1e-16)
-    assert multiply_add(2.0, 3.0, 4.0) == 10.0
+    assert fused(_difference_last)(0.3, 0.7, 0.2) == 0.2 - 0.3 * 0.7

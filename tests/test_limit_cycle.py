@@ -11,11 +11,14 @@ import pytest
 from scipy.optimize import brentq
 
 from lean_yaw_env import LimitCycle, NoGaitError, Walker, WalkerParameters, find_limit_cycle
-from lean_yaw_env.analysis.limit_cycle import find_gait, planar_gait_rate
-from lean_yaw_env.analysis.stride import stride_jacobian, stride_map
+from lean_yaw_env.analysis import ActiveMap, find_gait, planar_gait_rate, section_map_of
+from lean_yaw_env.analysis.fixed_point import solve_fixed_point
+from lean_yaw_env.analysis.path import axle_middle
 from lean_yaw_env.errors import FellError
 from lean_yaw_env.parameters import MIRROR, Vector
 from tests.reference import ReferenceWalker
+
+STRIDE = section_map_of(Walker()).over(2)
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +31,7 @@ def cycle() -> LimitCycle:
 
 def test_the_gait_repeats_itself_to_round_off(cycle: LimitCycle) -> None:
     assert cycle.residual <= 1e-12
-    first, second = stride_map(Walker(), cycle.state)
+    first, second = STRIDE.results(cycle.state)
     assert np.abs(second.state - cycle.state).max() <= 1e-12
     # and a right step is a left step's mirror image
     assert np.abs(first.state - cycle.state * MIRROR).max() <= 1e-12
@@ -49,10 +52,10 @@ def test_the_gait_is_the_reference_s_to_ten_digits(cycle: LimitCycle) -> None:
 
 
 def test_multipliers_are_those_of_the_exact_jacobian(cycle: LimitCycle) -> None:
-    jacobian = stride_jacobian(Walker(), cycle.state)
-    assert np.abs(jacobian.matrix - cycle.jacobian).max() < 1e-11
-    assert np.abs(jacobian.state - cycle.state).max() < 1e-12
-    own = np.linalg.eigvals(jacobian.matrix)
+    state, matrix = STRIDE.derivative(cycle.state)
+    assert np.abs(matrix - cycle.jacobian).max() < 1e-11
+    assert np.abs(state - cycle.state).max() < 1e-12
+    own = np.linalg.eigvals(matrix)
     own = own[np.argsort(-np.abs(own))]
     assert np.abs(np.abs(own) - np.abs(cycle.eigenvalues)).max() < 1e-10
 
@@ -61,7 +64,7 @@ def test_disturbances_die_out_as_the_first_multiplier_says(cycle: LimitCycle) ->
     state = cycle.state + 1e-4
     distances = []
     for _ in range(120):
-        state = stride_map(Walker(), state)[1].state
+        state = STRIDE.image(state)
         distances.append(np.abs(state - cycle.state).max())
     # after sixty strides the second multiplier, 0.959, has all but died out; second-order terms are of 1e-4
     ratio = (distances[119] / distances[79]) ** (1 / 40)
@@ -94,6 +97,53 @@ def test_without_hip_width_the_gait_is_the_planar_closed_form(radius: float, slo
 
 def test_the_two_searches_agree(cycle: LimitCycle) -> None:
     assert np.abs(find_gait(Walker()) - cycle.state).max() < 1e-10
+
+
+def test_turns_to_either_side_are_mirror_images() -> None:
+    walker = Walker(WalkerParameters(slope_turns=True))
+    right, left = (find_limit_cycle(walker, mass_offset=offset) for offset in (0.05, -0.05))
+    assert left.turn == pytest.approx(-right.turn, abs=1e-11)
+    for name in ("speed", "step_length", "gravity_work", "turning_radius", "stride_period"):
+        assert getattr(left, name) == pytest.approx(getattr(right, name), rel=1e-10)
+    # the two feet walk on circles that lie a hip width apart, so that the mean of both counts
+    chords = [
+        float(np.linalg.norm(sum(step.displacement for step in gait.steps)))
+        for gait in (right, left)
+    ]
+    assert abs(chords[0] - chords[1]) > 0.03 * chords[0]
+    assert right.step_length == pytest.approx(0.25 * sum(chords), rel=1e-10)
+
+
+def test_the_middle_of_the_axle_turns_about_one_centre_at_the_turning_radius() -> None:
+    walker = Walker(WalkerParameters(slope_turns=True))
+    gait = find_limit_cycle(walker, mass_offset=0.05)
+    walk = walker.walk(60, state=gait.state, mass_offset=0.05)
+    places = walk.footprints + [
+        axle_middle(walker, state, foot)
+        for state, foot in zip(walk.states, walk.stances, strict=True)
+    ]
+    # the circle through three left steps' places, and the one through three right steps'
+    radii = [_circle_through(*places[first::20][:3]) for first in (0, 1)]
+    assert gait.turning_radius == pytest.approx(np.mean(radii), rel=1e-5)
+    assert find_limit_cycle(Walker()).turning_radius == math.inf
+
+
+def _circle_through(a: Vector, b: Vector, c: Vector) -> float:
+    """Its radius: product of the sides over four times the area."""
+    sides = [float(np.linalg.norm(p - q)) for p, q in ((a, b), (b, c), (c, a))]
+    (x1, z1), (x2, z2) = b - a, c - a
+    return math.prod(sides) / (2.0 * abs(x1 * z2 - x2 * z1))
+
+
+def test_of_two_gaits_that_meet_at_a_fold_it_is_the_one_that_the_planar_gait_leads_to() -> None:
+    walker = Walker(WalkerParameters(0.42, 0.77, 0.9, 0.0082))
+    found = find_limit_cycle(walker, inter_leg_angle=0.38)
+    wide = ActiveMap(walker, 0.38, n_steps=1)
+    state = np.array([0.0, 0.19, 0.0, planar_gait_rate(walker, 0.38), 0.0])
+    for share in np.linspace(0.0, 1.0, 101):
+        state = solve_fixed_point(wide.moved("hip_width", 0.42 * share), state)
+    assert found.state == pytest.approx(state, abs=1e-10)
+    assert found.is_stable
 
 
 # --- published numbers
@@ -156,7 +206,7 @@ def test_figure_13_critical_speed_depends_on_the_tilt_alone(
 @pytest.mark.parametrize("offset", [0.002, 0.006, -0.006])
 def test_figure_15_an_offset_turns_the_gait_to_where_the_slope_balances_it(offset: float) -> None:
     cycle = find_limit_cycle(Walker(), mass_offset=offset)
-    first, second = stride_map(Walker(), cycle.state, mass_offset=offset)
+    first, second = cycle.steps
     heading = 0.5 * (first.state[0] + second.state[0])
     closed_form = -math.asin(offset / math.tan(0.01))
     # the closed form balances the moments at the mean heading: left and right steps differ by little
@@ -214,11 +264,11 @@ def test_a_bad_command_is_refused(command: dict[str, float], message: str) -> No
 
 
 def test_a_stride_that_falls_says_which_step_and_how(gait: Vector) -> None:
-    with pytest.raises(FellError, match="fell backward in the stride's first step"):
-        stride_map(Walker(), [0.0, 0.155, 0.0, 0.15, 0.0])
+    with pytest.raises(FellError, match="fell backward in step 1 of the gait"):
+        STRIDE.results(np.array([0.0, 0.155, 0.0, 0.15, 0.0]))
     with pytest.raises(FellError, match=r"fell .* in the step on its left foot"):
-        stride_jacobian(Walker(), [0.0, 0.155, 0.0, 0.15, 0.0])
+        STRIDE.derivative(np.array([0.0, 0.155, 0.0, 0.15, 0.0]))
     state = gait * [1.0, 1.0, 1.0, 0.3, 1.0]
     assert Walker().step(state).fall is None
-    with pytest.raises(FellError, match="fell backward in the stride's second step"):
-        stride_map(Walker(), state)
+    with pytest.raises(FellError, match="fell backward in step 2 of the gait"):
+        STRIDE.results(state)

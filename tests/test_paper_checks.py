@@ -167,14 +167,9 @@ def test_the_markdown_has_a_row_for_each_check_and_one_more_for_each_disagreemen
 
 
 def test_a_reproduction_leaves_report_pictures_and_numbers_and_no_scraps(tmp_path: Path) -> None:
-    seen: list[str] = []
-    done = reproduce(
-        ["table1", "figure4", "skateboard"],
-        tmp_path,
-        before_each=lambda piece: seen.append(piece.name),
-    )
+    done = reproduce(["table1", "figure4", "skateboard"], tmp_path)
     write_report(done, tmp_path)
-    assert seen == ["skateboard", "figure4", "table1"]
+    assert [each.piece.name for each in done.pieces] == ["skateboard", "figure4", "table1"]
     assert {path.name for path in tmp_path.iterdir()} == {
         "figure4.png",
         "figure4.csv",

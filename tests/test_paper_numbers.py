@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lean_yaw_env.analysis import continue_gait
+from lean_yaw_env.analysis.path import radius_of_walk
 from lean_yaw_env.paper import (
     active_claims,
     passive_claims,
@@ -184,15 +185,18 @@ def test_the_settled_heading_is_the_closed_form() -> None:
     assert steering.settled_heading() == pytest.approx(steering.asymptotic_heading(), rel=3e-3)
 
 
-def test_the_circle_closes_with_the_radius_its_strides_say() -> None:
+def test_the_circle_that_the_walk_closes_has_the_gaits_turning_radius() -> None:
     gait = steering.circling_gait()
     strides = round(2.0 * np.pi / abs(gait.turn))
-    walk = steering.circling_walker().walk(2 * strides, state=gait.state, mass_offset=0.05)
-    prints = walk.footprints[::2]
-    centre = 0.5 * (prints.max(axis=0) + prints.min(axis=0))
-    radii = np.linalg.norm(prints - centre, axis=1)
-    # Extremes of a polygon of 86 corners lie within a fraction (pi / 86)^2 / 2 of the circle's
-    np.testing.assert_allclose(radii, steering.circling_radius(gait), rtol=2e-3)
+    walker = steering.circling_walker()
+    walk = walker.walk(2 * strides, state=gait.state, mass_offset=0.05, samples_per_step=2)
+    # The centre of mass is moved by 0.05 to the inside of the turn
+    centre = walk.path[:, 1].mean(), walk.path[:, 3].mean()
+    radii = np.hypot(walk.path[:, 1] - centre[0], walk.path[:, 3] - centre[1])
+    assert radii.mean() == pytest.approx(8.11, abs=0.005)
+    assert gait.turning_radius == pytest.approx(radii.mean() + 0.05, abs=0.005)
+    # the first quarter has the same radius, but for the sway of its ends
+    assert radius_of_walk(walker, walk) == pytest.approx(gait.turning_radius, rel=3e-4)
 
 
 @pytest.mark.parametrize(

@@ -17,16 +17,14 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import lean_yaw_env  # noqa: F401  registers the environments
 from lean_yaw_env import Walker, WalkerParameters, find_limit_cycle
-from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.describe import INFO_MEANINGS, OPTIONAL_INFO_MEANINGS, renewed
+from lean_yaw_env.envs.dynamics import ANKLE_PUSH, PITCH_PUSH
+from lean_yaw_env.envs.formulas import mean_heading, place
+from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.envs.reset import BODY_DEVIATIONS, HELD_OUT_REACH
+from lean_yaw_env.envs.state import WALKER_FIELDS, as_records, mirror
 from lean_yaw_env.envs.tasks import slalom, speedheading, task_named, waypoint
-from lean_yaw_env.envs.transition import (
-    ANKLE_PUSH,
-    BODY_DEVIATIONS,
-    HELD_OUT_REACH,
-    PITCH_PUSH,
-)
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.registration import ENV_IDS, TASK_VERSIONS
@@ -120,7 +118,7 @@ def test_a_fall_terminates_and_pays_nothing(task: str) -> None:
     assert terminated
     assert not truncated
     assert reward == 0.0
-    assert info["fall"] == "backward"
+    assert info["fall"] == FallCode.BACKWARD
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -149,24 +147,13 @@ def test_observations_and_metrics_are_what_the_task_names(task: str) -> None:
     assert set(info) >= set(INFO_MEANINGS)
 
 
-_ODD = (
-    c.HEADING, c.ANKLE, c.ANKLE_RATE, c.SIDE, c.OFFSET, c.PREVIOUS_HEADING, c.PLACE_Z,
-    c.COMMANDED_OFFSET, c.PENDING_OFFSET,
-)  # fmt: skip
-_ODD_OF_TASK = {
-    "Waypoint": (waypoint.GOAL_Z,),
-    "Slalom": tuple(slalom.WAVE + 2 * k + 1 for k in range(slalom.WAVES)),
-}
-
-
 @pytest.mark.parametrize("task", TASKS)
 def test_a_mirrored_world_looks_and_pays_the_same(task: str) -> None:
     env, mirrored = (WalkerEnv(task, push_level=0.0) for _ in range(2))
     for each in (env, mirrored):
         each.reset(seed=3)
-    column = env.task.command_column
-    odd = [*_ODD, *_ODD_OF_TASK.get(task, () if column is None else (column,))]
-    mirrored.rows.memory[0, odd] *= -1.0
+    mirror(mirrored.simulation.walkers, WALKER_FIELDS)
+    mirror(mirrored.simulation.tasks, env.task.fields)
     actions = np.random.default_rng(3).uniform(-0.5, 0.5, (30, 2)).astype(np.float32)
     for action in actions:
         a, b = env.step(action), mirrored.step(action)
@@ -195,7 +182,7 @@ def test_noise_has_its_standard_deviation_and_spares_the_stance_foot() -> None:
     n, size = 4000, 0.5
     options = {"mirror": False, "start_disturbance": 0.0}
     clean, noisy = (started("Walk", n, **options, sensor_noise=each) for each in (0.0, size))
-    noise = (noisy.rows.observations - clean.rows.observations).astype(float)
+    noise = (noisy.simulation.observations - clean.simulation.observations).astype(float)
     foot = 6
     assert np.all(noise[:, foot] == 0.0)
     rest = np.delete(noise, foot, axis=1)
@@ -211,7 +198,7 @@ def test_hidden_rates_show_zero_and_change_nothing_else() -> None:
     for _ in range(5):
         shown.step(ZERO[None])
         hidden.step(ZERO[None])
-    a, b = shown.rows.observations[0], hidden.rows.observations[0]
+    a, b = shown.simulation.observations[0], hidden.simulation.observations[0]
     assert np.all(b[3:5] == 0.0)
     assert np.all(a[3:5] != 0.0)
     assert np.array_equal(np.delete(a, (3, 4)), np.delete(b, (3, 4)))
@@ -240,7 +227,7 @@ def test_a_delayed_offset_keeps_its_side_of_the_walker() -> None:
 @pytest.mark.parametrize(("kind", "reach"), [("training", 1.0), ("held-out", HELD_OUT_REACH)])
 def test_random_bodies_fill_their_box(kind: str, reach: float) -> None:
     envs = started("Walk", 2000, random_body=kind)
-    own = envs.rows.bodies[:, : len(BODY)]
+    own = envs.simulation.bodies[:, : len(BODY)]
     nominal = np.array([getattr(WalkerParameters(), name) for name in BODY])
     deviations = (own - nominal) / np.array(BODY_DEVIATIONS)
     largest = np.abs(deviations).max(axis=1)
@@ -278,8 +265,8 @@ def test_a_new_episode_has_a_new_body() -> None:
 def test_pushes_have_their_size_and_are_part_of_the_state() -> None:
     n, level = 4000, 0.3
     envs = started("Walk", n, push_level=level, start_disturbance=0.0)
-    start = envs.rows.memory[:, :5].copy()
-    sides = envs.rows.memory[:, c.SIDE].copy()
+    start = envs.simulation.states.copy()
+    sides = envs.simulation.walkers["side"].copy()
     *_, info = envs.step(np.zeros((n, 2), np.float32))
     for name, size in (("pitch_push", PITCH_PUSH), ("ankle_push", ANKLE_PUSH)):
         pushes = info[name]
@@ -298,7 +285,7 @@ def test_a_friction_limit_makes_walkers_slip() -> None:
         *_, terminated, _, info = env.step(np.array([0.0, 1.0], dtype=np.float32))
         if terminated:
             break
-    assert info["fall"] == "slip"
+    assert info["fall"] == FallCode.SLIP
 
 
 def test_slope_and_friction_replace_the_parameters() -> None:
@@ -312,14 +299,17 @@ def test_slope_and_friction_replace_the_parameters() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"sensor_noise": -0.1}, r"sensor_noise must be in \[0, 10\], not -0.1"),
-        ({"push_level": 11.0}, r"push_level must be in \[0, 10\], not 11"),
-        ({"action_delay": 1}, "action_delay must be True or False, not 1"),
+        ({"sensor_noise": -0.1}, r"sensor_noise must be in \[0, 10\], got -0.1"),
+        ({"push_level": 11.0}, r"push_level must be in \[0, 10\], got 11"),
+        ({"action_delay": 1}, "action_delay must be True or False, got 1"),
         ({"hidden_rates": None}, "hidden_rates must be True or False"),
-        ({"random_body": "test"}, "random_body must be None, 'training' or 'held-out', not 'test'"),
+        (
+            {"random_body": "test"},
+            "random_body must be None or one of training, held-out, got 'test'",
+        ),
         ({"random_body": ["training"]}, "random_body must be None"),
-        ({"slope": 1.0}, r"slope must be in \[-0.5, 0.5\], not 1.0"),
-        ({"friction_limit": 0.0}, r"friction_limit must be in \(0, inf\], not 0.0"),
+        ({"slope": 1.0}, r"slope must be in \[-0.5, 0.5\], got 1.0"),
+        ({"friction_limit": 0.0}, r"friction_limit must be in \(0, inf\], got 0.0"),
     ],
 )
 def test_bad_options_are_named(options: dict[str, Any], words: str) -> None:
@@ -336,8 +326,8 @@ def test_a_box_of_impossible_bodies_is_refused() -> None:
     ("task", "options", "words"),
     [
         ("Walk", {"command": 0.1}, r"'command' is not one of state, stance \(task Walk"),
-        ("Waypoint", {"goal": (1.0,)}, "'goal' must hold 2 numbers"),
-        ("SpeedHeading", {"speed": 0.9}, r"speed must be in \[0.3, 0.55\], not 0.9"),
+        ("Waypoint", {"goal": (1.0,)}, r"goal must have shape \(2,\), got \(1,\)"),
+        ("SpeedHeading", {"speed": 0.9}, r"speed must be in \[0.3, 0.55\], got 0.9"),
         ("Heading", {"command": "left"}, "command must be a number"),
     ],
 )
@@ -360,7 +350,7 @@ def test_walking_pays_by_the_time_it_takes() -> None:
     ("task", "largest"), [("Heading", 0.6), ("UTurn", math.pi), ("Level", 0.6)]
 )
 def test_commands_fill_their_range(task: str, largest: float) -> None:
-    commands = started(task, 2000).rows.memory[:, task_named(task).command_column]
+    commands = started(task, 2000).simulation.tasks["command"]
     assert np.abs(commands).max() <= largest
     # the largest of 2000 uniform draws is within a hundredth of the bound but for e^-20
     assert commands.max() > 0.99 * largest
@@ -402,10 +392,10 @@ def test_speed_heading_reports_both_errors() -> None:
 
 
 def test_goals_are_set_all_round_and_at_their_distance() -> None:
-    memory = started("Waypoint", 2000, start_disturbance=0.0).rows.memory
-    aside = 0.5 * 0.3 * memory[:, c.SIDE]  # the walker's middle, at heading ~ 0
-    x = memory[:, waypoint.GOAL_X]
-    z = memory[:, waypoint.GOAL_Z] - aside
+    simulation = started("Waypoint", 2000, start_disturbance=0.0).simulation
+    aside = 0.5 * 0.3 * simulation.walkers["side"]  # the walker's middle, at heading ~ 0
+    x = simulation.tasks["goal_x"]
+    z = simulation.tasks["goal_z"] - aside
     distance = np.hypot(x, z)
     # the gait's footprints head 0.0015 rad to one side, which moves the middle by 0.0003
     assert 8.0 - 1e-3 < distance.min() < 8.1
@@ -426,9 +416,7 @@ def test_approaching_pays_and_reaching_sets_another_goal() -> None:
     env = WalkerEnv("Waypoint", start_disturbance=0.0)
     _, info = env.reset(seed=0, options={"goal": (3.0, 0.0)})
     while info["goals"] == 0.0:
-        before = (
-            info["goal_distance"] if info["steps"] else env.rows.memory[0, waypoint.GOAL_DISTANCE]
-        )
+        before = info["goal_distance"]
         _, reward, terminated, _, info = env.step(ZERO)
         assert not terminated
         if info["goals"] == 0.0:
@@ -450,9 +438,8 @@ def test_where_the_slope_turns_the_heading_is_not_shown() -> None:
 
 
 def test_slalom_paths_keep_to_their_limits() -> None:
-    memory = started("Slalom", 1000).rows.memory
-    waves = memory[:, slalom.WAVE : slalom.WAVE + 2 * slalom.WAVES].reshape(1000, -1, 2)
-    numbers, heights = waves[..., 0], waves[..., 1]
+    simulation = started("Slalom", 1000).simulation
+    numbers, heights = simulation.tasks["wave_numbers"], simulation.tasks["heights"]
     lengths = 2.0 * np.pi / numbers
     assert 12.0 <= lengths.min() < 12.2
     assert 79.0 < lengths.max() <= 80.0
@@ -460,7 +447,7 @@ def test_slalom_paths_keep_to_their_limits() -> None:
     assert steepest.max() <= 0.8 + 1e-12  # round-off of a sum of three
     assert steepest.max() > 0.7
     assert np.abs(heights * numbers**2).sum(axis=1).max() <= 0.08 + 1e-12
-    assert np.all(slalom.reference_path(memory[0])[0] == 0.0)
+    assert np.all(slalom.reference_path(*simulation.records(0))[0] == 0.0)
 
 
 def test_slalom_shows_the_path_where_it_is_drawn() -> None:
@@ -468,13 +455,17 @@ def test_slalom_shows_the_path_where_it_is_drawn() -> None:
     env.reset(seed=5)
     for _ in range(10):
         observation, _, _, _, info = env.step(ZERO)
-    memory = env.rows.memory[0]
-    path = slalom.reference_path(memory)
-    heading = 0.5 * (memory[c.HEADING] + memory[c.PREVIOUS_HEADING])
-    aside = 0.15 * memory[c.SIDE]
-    own = memory[[c.PLACE_X, c.PLACE_Z]] + aside * np.array(
-        [math.sin(memory[c.HEADING]), math.cos(memory[c.HEADING])]
+    walker, task = env.simulation.records(0)
+    path = slalom.reference_path(walker, task)
+    heading = 0.5 * (walker.heading + walker.previous_heading)
+    aside = 0.15 * walker.side
+    own = np.array([walker.place_x, walker.place_z]) + aside * np.array(
+        [math.sin(walker.heading), math.cos(walker.heading)]
     )
+    # the two formulas that everyone shares say the same, of one walker and of many
+    assert place(walker) == tuple(own)
+    assert mean_heading(walker) == heading
+    assert place(as_records(env.simulation.walkers))[0] == own[0]
     left = np.array([-math.sin(heading), -math.cos(heading)])
     for k, ahead in enumerate(slalom.PREVIEWS):
         x = own[0] + ahead
@@ -497,7 +488,7 @@ def test_slalom_ends_three_leg_lengths_off_the_path_without_reward() -> None:
         squares += info["cross_track_error"] ** 2 * info["duration"]
         time += info["duration"]
     assert terminated
-    assert info["fall"] is None
+    assert info["fall"] == FallCode.NONE
     assert reward == 0.0
     assert 3.0 < abs(info["cross_track_error"]) < 3.5  # a step is 0.3 long
     assert info["rms_cross_track_error"] == pytest.approx(math.sqrt(squares / time), abs=1e-9)
@@ -553,7 +544,9 @@ def test_level_is_walked_and_steered_by_pumping_alone(slope: float) -> None:
     for steering in (0.0, 0.6):
         envs = started("Level", n, slope=slope)
         for _ in range(300):  # of 0.5 to 0.55 units of time, within the horizon
-            _, _, terminated, truncated, info = envs.step(pumping(envs.rows.observations, steering))
+            _, _, terminated, truncated, info = envs.step(
+                pumping(envs.simulation.observations, steering)
+            )
             assert not terminated.any()
             assert not truncated.any()
         errors.append(info["mean_absolute_heading_error"].mean())
@@ -574,7 +567,7 @@ def test_level_without_pumping_falls_and_pumping_costs_what_the_gait_takes() -> 
     terminated = truncated = False
     while not (terminated or truncated):
         *_, terminated, truncated, info = env.step(ZERO)
-    assert info["fall"] is not None
+    assert info["fall"] != FallCode.NONE
 
 
 def test_pictures_show_goals_and_the_path() -> None:
@@ -582,7 +575,7 @@ def test_pictures_show_goals_and_the_path() -> None:
 
     env = WalkerEnv("Waypoint", start_disturbance=0.0)
     env.reset(seed=0, options={"goal": (1.5, 0.0)})
-    footage = Footage(env.rows)
+    footage = Footage(env.simulation)
     for _ in range(6):
         env.step(ZERO)
         footage.extend()
@@ -591,6 +584,6 @@ def test_pictures_show_goals_and_the_path() -> None:
     assert goals[0][:3] == (1.5, 0.0, waypoint.RADIUS)
     env = WalkerEnv("Slalom")
     env.reset(seed=0)
-    scene = Footage(env.rows).scene(None)
+    scene = Footage(env.simulation).scene(None)
     assert scene.reference_path is not None
-    assert np.array_equal(scene.reference_path, slalom.reference_path(env.rows.memory[0]))
+    assert np.array_equal(scene.reference_path, slalom.reference_path(*env.simulation.records(0)))

@@ -14,7 +14,7 @@ from lean_yaw_env import WalkerParameters
 from lean_yaw_env.analysis import find_limit_cycle
 from lean_yaw_env.kernel import records
 from lean_yaw_env.kernel.fusing import multiply_add
-from lean_yaw_env.kernel.jacobian import INPUTS, OUTPUTS, step_jacobian
+from lean_yaw_env.kernel.jacobian import OUTPUTS, step_jacobian
 from lean_yaw_env.kernel.passive import (
     INPUTS as PASSIVE_INPUTS,
 )
@@ -33,6 +33,7 @@ WEB = Path(__file__).parents[1] / "web"
 NODE = shutil.which("node")
 PASSIVE_COLUMNS = 8
 SAMPLES = 17
+INPUTS = 8  # the section state and the command
 
 sys.path.insert(0, str(WEB))
 build_kernel = pytest.importorskip("build_kernel", reason="the page's sources are not here")
@@ -158,9 +159,8 @@ def test_derivatives_of_a_step_have_the_same_bits():
     n_outputs = len(OUTPUTS)
     expected = np.empty((len(rows), 5 + n_outputs * INPUTS + 1))
     for i, (body, command, state, side) in enumerate(parts_of(rows)):
-        after, jacobian = np.empty(5), np.empty((n_outputs, INPUTS))
-        status = step_jacobian(Body(*body), Command(*command), *state, side, after, jacobian)
-        expected[i] = [*after, *jacobian.ravel(), status]
+        status, outputs, jacobian = step_jacobian(body, command, state, side, inputs=INPUTS)
+        expected[i] = [*outputs[:5], *jacobian.ravel(), status]
     ours = run_module("walker_jacobian", rows, expected.shape[1], "@5", f"@{n_outputs * INPUTS}")
     assert_same_bits(ours, expected)
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numba import carray, njit, types
 
-from lean_yaw_env.kernel.jacobian import INPUTS, OUTPUTS, STATE_SIZE, step_jacobian
+from lean_yaw_env.kernel.jacobian import OUTPUTS, step_jacobians
 from lean_yaw_env.kernel.passive import (
     INPUTS as PASSIVE_INPUTS,
 )
@@ -23,10 +24,12 @@ from lean_yaw_env.kernel.passive import (
 from lean_yaw_env.kernel.passive import (
     passive_step as passive_walking_step,
 )
-from lean_yaw_env.kernel.records import STEPPED, Body, Command, Outcome
+from lean_yaw_env.kernel.records import STEPPED, Body, Command, Outcome, SectionState
 from lean_yaw_env.kernel.step import walking_step
 from lean_yaw_env.kernel.trace import COLUMNS, trace
 
+STATE_SIZE = len(SectionState._fields)
+INPUTS = STATE_SIZE + len(Command._fields)
 PASSIVE_STATE_SIZE = STATE_SIZE + 1
 PASSIVE_COLUMNS = 8  # of ``passive_trace``
 
@@ -114,19 +117,19 @@ def walker_trace(inputs, duration, n, rows):
 
 def walker_jacobian(inputs, state, jacobian):
     """The next section state and the derivatives of all outputs; returns the status."""
-    row, s = carray(inputs, WALKER_ROW), STATE
-    return step_jacobian(
-        _body(row),
-        _command(row),
-        row[s],
-        row[s + 1],
-        row[s + 2],
-        row[s + 3],
-        row[s + 4],
-        row[SIDE],
-        carray(state, STATE_SIZE),
-        carray(jacobian, (len(OUTPUTS), INPUTS)),
+    rows, status = carray(inputs, (1, WALKER_ROW)), np.empty(1)
+    step_jacobians(
+        rows[:, :BODY].copy(),
+        rows[:, BODY:STATE].copy(),
+        rows[:, STATE:SIDE].copy(),
+        rows[:, SIDE].copy(),
+        status,
+        carray(state, (1, STATE_SIZE)),
+        carray(jacobian, (1, len(OUTPUTS), INPUTS)),
+        0,
+        1,
     )
+    return status[0]
 
 
 def walker_walk(inputs, n, outcome):

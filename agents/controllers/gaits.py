@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import root
 
-from lean_yaw_env.analysis.fixed_point import RESIDUAL_LIMIT, solve_fixed_point
 from lean_yaw_env.analysis.active_map import ActiveMap, has_downhill
+from lean_yaw_env.analysis.fixed_point import RESIDUAL_LIMIT, solve_fixed_point
 from lean_yaw_env.analysis.path import distance_walked
-from lean_yaw_env.analysis.stride import StepDerivatives, differentiate_step
+from lean_yaw_env.analysis.step_derivatives import StepDerivatives, differentiate_step
 from lean_yaw_env.envs.formulas import advance
 from lean_yaw_env.envs.options import gait_of
 from lean_yaw_env.errors import LeanYawError, NoGaitError
@@ -121,7 +121,9 @@ def _speed_gradient(state: Vector, step: StepDerivatives) -> Vector:
     carrying = step.outputs[:, None] + 1j * _TINY * step.jacobian
     named = dict(zip(OUTPUTS, carrying, strict=True))
     before = state[0] + 1j * _TINY * np.eye(1, step.jacobian.shape[1])[0]
-    along = advance(named["displacement_x"], named["displacement_z"], 0.5 * (before + named["heading"]))
+    along = advance(
+        named["displacement_x"], named["displacement_z"], 0.5 * (before + named["heading"])
+    )
     return (along / named["duration"]).imag / _TINY
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lean_yaw_env.envs.observation import OFFSET_SCALE
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.envs.transition import OFFSET_SCALE
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.validation import require_number
 

@@ -12,9 +12,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
-from lean_yaw_env.envs.rows import WalkerRows
+from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.validation import require_number
@@ -32,10 +31,10 @@ _FLOOR = 0.12  # least spread, as a share of the first: what is found early may 
 _DIRECTIONS = 3  # of ``PlanSpread``
 
 
-class HasRows(Protocol):
+class HasSimulation(Protocol):
     """An environment of walkers: ``WalkerEnv`` or ``WalkerVectorEnv``."""
 
-    rows: WalkerRows
+    simulation: Simulation
 
 
 class MpcController:
@@ -83,7 +82,7 @@ class MpcController:
         self._tables = generator.standard_normal(
             (_TABLES, settings.iterations, settings.samples, len(knots), _DIRECTIONS)
         )
-        self._rows: WalkerRows | None = None
+        self._simulation: Simulation | None = None
         self._rollouts: Rollouts | None = None
 
     def attach(self, env: Any) -> None:
@@ -94,14 +93,14 @@ class MpcController:
         ValueError
             If the environment is of another task or other options.
         """
-        inner: HasRows = getattr(env, "unwrapped", env)
-        rows = inner.rows
-        if rows.task.name != self._task:
-            raise ValueError(f"env must be of task {self._task!r}, not {rows.task.name!r}")
-        if rows.options != self._options:
-            raise ValueError(f"env must have options {self._options}, not {rows.options}")
-        self._rows = rows
-        self._rollouts = Rollouts(rows, self._settings, self._base, self._seed)
+        inner: HasSimulation = getattr(env, "unwrapped", env)
+        simulation = inner.simulation
+        if simulation.task.name != self._task:
+            raise ValueError(f"env must be of task {self._task!r}, got {simulation.task.name!r}")
+        if simulation.options != self._options:
+            raise ValueError(f"env must have options {self._options}, got {simulation.options}")
+        self._simulation = simulation
+        self._rollouts = Rollouts(simulation, self._settings, self._base, self._seed)
 
     def predict(
         self,
@@ -121,28 +120,28 @@ class MpcController:
         ValueError
             If there is not one observation for each of the environment's walkers.
         """
-        rows, rollouts = self._rows, self._rollouts
-        if rows is None or rollouts is None:
+        simulation, rollouts = self._simulation, self._rollouts
+        if simulation is None or rollouts is None:
             raise RuntimeError("attach(env) must be called before predict: plans are tried on it")
         shape = np.shape(observation)[:-1]
-        if int(np.prod(shape)) != rows.n or not np.ndim(observation):
+        if int(np.prod(shape)) != simulation.n or not np.ndim(observation):
             raise ValueError(
-                f"observation must hold one for each of {rows.n} walkers, not {np.shape(observation)}"
+                f"observation must hold one for each of {simulation.n} walkers, got {np.shape(observation)}"
             )
-        starts = np.ones(rows.n, dtype=np.bool_)
-        left = np.zeros((rows.n, self._settings.horizon, ACTION_SIZE))
+        starts = np.ones(simulation.n, dtype=np.bool_)
+        left = np.zeros((simulation.n, self._settings.horizon, ACTION_SIZE))
         if state is not None:
-            starts = np.zeros(rows.n, dtype=np.bool_)
+            starts = np.zeros(simulation.n, dtype=np.bool_)
             left = _one_step_on(state[0])
         if episode_start is not None:
-            starts = starts | np.reshape(episode_start, rows.n)
+            starts = starts | np.reshape(episode_start, simulation.n)
         plans = np.empty_like(left)
         size = max(1, _BLOCK // (self._settings.samples * max(self._settings.scenarios, 1)))
-        for first in range(0, rows.n, size):
-            block = np.arange(first, min(first + size, rows.n))
+        for first in range(0, simulation.n, size):
+            block = np.arange(first, min(first + size, simulation.n))
             plans[block] = self._search(rollouts, block, left[block], starts[block])
         actions = plans[:, 0].copy()
-        actions[:, 1] *= rollouts.sides(np.arange(rows.n))
+        actions[:, 1] *= rollouts.sides(np.arange(simulation.n))
         return actions.astype(np.float32).reshape(*shape, ACTION_SIZE), (plans,)
 
     def _search(
@@ -157,7 +156,7 @@ class MpcController:
         mean, deviation = np.zeros(knots), np.broadcast_to(spread, knots)
         best, most = base, np.full(len(block), -np.inf)
         of_base = most
-        tables = self._tables[self._memory(block, c.STEPS).astype(np.int64) % _TABLES]
+        tables = self._tables[self._read(block, "steps") % _TABLES]
         for iteration in range(settings.iterations):
             tried = mean[:, None] + deviation[:, None] * tables[:, iteration]
             tried[:, 0] = mean
@@ -194,7 +193,7 @@ class MpcController:
         """Plans (block, m, horizon, 2) from deviations at the knots (block, m, knots, 3)."""
         change = np.einsum("hk,nmkd->nmhd", self._steps_of_knots, tried)
         feet = np.where(np.arange(self._settings.horizon) % 2 == 0, 1.0, -1.0)
-        stance = self._memory(block, c.SIDE)[:, None, None] * feet
+        stance = self._read(block, "side")[:, None, None] * feet
         plans = np.repeat(centre[:, None], tried.shape[1], axis=1)
         plans[..., 0] += change[..., 0]
         plans[..., 1] += change[..., 1] + stance * change[..., 2]
@@ -205,9 +204,9 @@ class MpcController:
             return np.zeros(plans.shape[:2])
         return self._settings.trust * np.square(0.5 * (plans - base[:, None])).mean(axis=(2, 3))
 
-    def _memory(self, block: NDArray[np.int64], column: int) -> Vector:
-        assert self._rows is not None
-        return self._rows.memory[block, column]
+    def _read(self, block: NDArray[np.int64], field: str) -> NDArray[Any]:
+        assert self._simulation is not None
+        return self._simulation.walkers[field][block]
 
 
 def _one_step_on(plans: Vector) -> Vector:

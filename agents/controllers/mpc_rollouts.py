@@ -1,4 +1,4 @@
-"""What plans are worth: many of them walked by the environment's own compiled steps, in rows of memory copied from the episode's."""
+"""What plans are worth: many of them walked by the environment's own compiled steps, in a simulation copied from the episode's."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.agent import Agent
-from agents.controllers.mpc_settings import MpcSettings
-from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.options import ACTION_SIZE
-from lean_yaw_env.envs.rows import WalkerRows
-from lean_yaw_env.kernel.records import FAILED
+from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.parameters import Vector
+
+from ..agent import Agent
+from .mpc_settings import MpcSettings
 
 _KEYS = 64  # sets of scenarios, one for each step of an episode in turn
 _LARGEST_PUSH = 10.0  # push level that there is
@@ -50,8 +49,8 @@ class Rollouts:
 
     Parameters
     ----------
-    rows : WalkerRows
-        Of the environment; read, never changed.
+    simulation : Simulation
+        The environment's; read, never changed.
     settings : MpcSettings
     base : Agent
         That remembers nothing; walks the tail.
@@ -59,12 +58,14 @@ class Rollouts:
         Of the scenarios.
     """
 
-    def __init__(self, rows: WalkerRows, settings: MpcSettings, base: Agent, seed: int) -> None:
-        self._rows = rows
+    def __init__(
+        self, simulation: Simulation, settings: MpcSettings, base: Agent, seed: int
+    ) -> None:
+        self._simulation = simulation
         self._settings = settings
         self._base = base
-        task, options = rows.task, rows.options
-        level = task.push_level if options.push_level is None else options.push_level
+        options = simulation.options
+        level = options.for_task(simulation.task).push_level
         self._quiet = replace(options, push_level=0.0, sensor_noise=0.0, hidden_rates=False)
         scale = settings.push_scale if settings.scenarios else 0.0
         self._pushed = replace(self._quiet, push_level=min(scale * level, _LARGEST_PUSH))
@@ -72,26 +73,26 @@ class Rollouts:
         self._keys = generator.integers(
             2**64, size=(_KEYS, max(settings.scenarios, 1)), dtype=np.uint64
         )
-        self._scratch: dict[tuple[int, bool], WalkerRows] = {}
+        self._scratch: dict[tuple[int, bool], Simulation] = {}
 
     def sides(self, block: NDArray[np.int64]) -> Vector:
         """What turns an offset in space into an action and back, (block,): actions of a mirrored environment are as of a left stance."""
-        sides = self._rows.memory[block, c.SIDE]
+        sides = self._simulation.walkers["side"][block]
         return sides if self._quiet.mirror else np.ones_like(sides)
 
     def base_plans(self, block: NDArray[np.int64]) -> Vector:
         """The base controller's actions from here on if nobody pushes, (block, horizon, 2), offsets in space."""
         n, horizon = len(block), self._settings.horizon
-        rows = self._copied(block, 1, is_pushed=False)
+        copies = self._copied(block, 1, is_pushed=False)
         plans = np.zeros((n, horizon, ACTION_SIZE))
         ended = np.zeros(n, dtype=np.bool_)
         for step in range(horizon):
-            actions = self._base.predict(rows.observations)[0]
+            actions = self._base.predict(copies.observations)[0]
             plans[:, step] = actions
-            plans[:, step, _OFFSET] *= self._signs(rows)
-            rows.actions[:] = actions
-            rows.step_many(ended, 0, n)
-            ended |= rows.terminated | rows.truncated | _failed(rows)
+            plans[:, step, _OFFSET] *= self._signs(copies)
+            copies.actions[:] = actions
+            copies.step_many(ended, 0, n)
+            ended |= copies.terminated | copies.truncated
         return plans
 
     def worth(self, plans: Vector, block: NDArray[np.int64]) -> Vector:
@@ -99,67 +100,56 @@ class Rollouts:
         settings = self._settings
         n, m = plans.shape[:2]
         draws = max(settings.scenarios, 1)
-        rows = self._copied(block, m * draws, is_pushed=True)
+        copies = self._copied(block, m * draws, is_pushed=True)
         actions = np.repeat(plans.reshape(n * m, settings.horizon, ACTION_SIZE), draws, axis=0)
-        account = _Account.at(rows.memory[:, c.TIME])
+        account = _Account.at(copies.walkers["time"])
         last = settings.horizon + settings.tail - 1
         for step in range(last + 1):
             if step < settings.horizon:
-                rows.actions[:] = actions[:, step]
-                rows.actions[:, _OFFSET] *= self._signs(rows)
+                copies.actions[:] = actions[:, step]
+                copies.actions[:, _OFFSET] *= self._signs(copies)
             else:
-                rows.actions[:] = self._base.predict(rows.observations)[0]
-            rows.step_many(~account.live, 0, rows.n)
-            self._settle(rows, account, step, step == last)
+                copies.actions[:] = self._base.predict(copies.observations)[0]
+            copies.step_many(~account.live, 0, copies.n)
+            self._settle(copies, account, step, step == last)
             if not account.live.any():
                 break
         return account.worth.reshape(n, m, draws).mean(axis=-1)
 
-    def _settle(self, rows: WalkerRows, account: _Account, step: int, is_last: bool) -> None:
-        """Take a step into the account."""
-        settings = self._settings
-        failed = _failed(rows)  # a step that does not converge is as good as a fall
-        falls = account.live & (rows.terminated | failed)
-        walked = account.live & ~failed
-        rewards = rows.rewards - settings.step_price
-        account.worth += np.where(walked, rewards, 0.0) - settings.fall * falls
-        account.rewards[step % 2, walked] = rewards[walked]
-        account.durations[step % 2, walked] = rows.outcomes[walked, c.OUTCOME_DURATION]
-        elapsed = rows.memory[:, c.TIME] - account.start
-        window = np.minimum(settings.window, rows.settings[c.HORIZON] - account.start)
-        ends = (elapsed >= window) | rows.truncated | is_last
+    def _settle(self, copies: Simulation, account: _Account, step: int, is_last: bool) -> None:
+        """Take a step into the account; one that the solver gave up counts as a fall."""
+        settings, walkers = self._settings, copies.walkers
+        falls = account.live & copies.terminated
+        rewards = copies.rewards - settings.step_price
+        account.worth += np.where(account.live, rewards, 0.0) - settings.fall * falls
+        account.rewards[step % 2, account.live] = rewards[account.live]
+        account.durations[step % 2, account.live] = walkers["duration"][account.live]
+        elapsed = walkers["time"] - account.start
+        window = np.minimum(settings.window, copies.settings["horizon"] - account.start)
+        ends = (elapsed >= window) | copies.truncated | is_last
         if not settings.scenarios:
-            ends |= rows.stream[:, 1] > 0  # the task drew something
+            ends |= walkers["counter"] > 0  # the task drew something
         ends &= account.live & ~falls
         rate = account.rewards.sum(axis=0) / account.durations.sum(axis=0)
         account.worth += np.where(ends, rate * (window - elapsed), 0.0)
         account.live &= ~(ends | falls)
 
-    def _copied(self, block: NDArray[np.int64], copies: int, *, is_pushed: bool) -> WalkerRows:
-        """Scratch rows with as many copies of each walker of the block."""
+    def _copied(self, block: NDArray[np.int64], copies: int, *, is_pushed: bool) -> Simulation:
+        """A simulation with as many copies of each walker of the block."""
         n = len(block) * copies
-        options = self._pushed if is_pushed else self._quiet
-        rows = self._scratch.get((n, is_pushed))
-        if rows is None:
-            rows = self._scratch[n, is_pushed] = WalkerRows(self._rows.task, options, n)
-        rows.memory[:] = np.repeat(self._rows.memory[block], copies, axis=0)
-        if len(rows.bodies) > 1:
-            rows.bodies[:] = np.repeat(self._rows.bodies[block], copies, axis=0)
-        keys = self._keys[self._rows.memory[block, c.STEPS].astype(np.int64) % _KEYS]
+        simulation = self._scratch.get((n, is_pushed))
+        if simulation is None:
+            options = self._pushed if is_pushed else self._quiet
+            simulation = Simulation(self._simulation.task, options, n)
+            self._scratch[n, is_pushed] = simulation
+        simulation.take_over(self._simulation, np.repeat(block, copies))
+        keys = self._keys[self._simulation.walkers["steps"][block] % _KEYS]
         repeats = -(-copies // keys.shape[1])
-        rows.stream[:, 0] = np.tile(keys, (1, repeats))[:, :copies].ravel()
-        rows.stream[:, 1] = 0
-        rows.terminated[:] = rows.truncated[:] = False
-        # shown anew, without noise
-        everyone = np.arange(n)
-        rows.task.start_many(
-            rows.bodies, rows.memory, rows.stream, rows.settings, rows.observations, everyone, False
-        )
-        return rows
+        simulation.walkers["key"] = np.tile(keys, (1, repeats))[:, :copies].ravel()
+        simulation.walkers["counter"] = 0
+        simulation.ends[:] = False
+        simulation.observe()  # without noise
+        return simulation
 
-    def _signs(self, rows: WalkerRows) -> Vector | float:
-        return rows.memory[:, c.SIDE] if self._quiet.mirror else 1.0
-
-
-def _failed(rows: WalkerRows) -> NDArray[np.bool_]:
-    return rows.outcomes[:, c.OUTCOME_STATUS] == FAILED
+    def _signs(self, copies: Simulation) -> Vector | float:
+        return copies.walkers["side"] if self._quiet.mirror else 1.0

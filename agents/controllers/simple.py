@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -64,8 +65,9 @@ class RandomController:
         return self._generator.uniform(-1.0, 1.0, shape).astype(np.float32), None
 
 
-def _action_shape(observation: ArrayLike) -> tuple[int, ...]:
-    shape = np.shape(observation)
+def _action_shape(observation: ArrayLike | Mapping[str, ArrayLike]) -> tuple[int, ...]:
+    own = observation["observation"] if isinstance(observation, Mapping) else observation
+    shape = np.shape(own)
     if not shape:
         raise ValueError(f"observation must have shape (..., features), got {shape}")
     return (*shape[:-1], ACTION_SIZE)

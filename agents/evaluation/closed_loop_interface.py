@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lean_yaw_env.analysis import ClosedLoopMap
+from lean_yaw_env.analysis.closed_loop_map import Numbers
 from lean_yaw_env.analysis.section_map import Motion
 from lean_yaw_env.envs.formulas import advance, place
 from lean_yaw_env.envs.observation import OFFSET_SCALE, STATE_SCALES
@@ -43,10 +44,10 @@ class Remembered(NamedTuple):
     field: str
     motion: Motion
     scale: float
-    after: Callable[[Vector, Mapping[str, Vector]], Vector]
+    after: Callable[[Numbers, Mapping[str, Numbers]], Numbers]
 
 
-def _speed(states: Vector, outputs: Mapping[str, Vector]) -> Vector:
+def _speed(states: Numbers, outputs: Mapping[str, Numbers]) -> Numbers:
     mean_heading = 0.5 * (states[:, 0] + outputs["heading"])
     return advance(outputs["displacement_x"], outputs["displacement_z"], mean_heading) / outputs["duration"]  # fmt: skip
 
@@ -84,9 +85,11 @@ class TaskInterface:
     def __init__(self, task: Task, options: EnvOptions, commands: Mapping[str, float]) -> None:
         self._task, self._options = task, options
         self._coordinates = {"previous_heading": _PREVIOUS_HEADING, **EXTRAS.get(task.name, {})}
-        self.remembered = {name: each.motion for name, each in self._coordinates.items()}
+        self.remembered: Mapping[str, Motion] = {
+            name: each.motion for name, each in self._coordinates.items()
+        }
         sees_heading = task.heading_field is not None or task.goal_fields is not None
-        self.headings = () if sees_heading else ("heading", "previous_heading")
+        self.headings: tuple[str, ...] = () if sees_heading else ("heading", "previous_heading")
         self.scales = np.array(
             [*STATE_SCALES, OFFSET_SCALE, *(each.scale for each in self._coordinates.values())]
         )
@@ -115,7 +118,7 @@ class TaskInterface:
         walkers = simulation.walkers
         return np.column_stack([walkers["inter_leg_angle"], walkers["commanded_offset"]])
 
-    def remember(self, states: Vector, outputs: Mapping[str, Vector]) -> Vector:
+    def remember(self, states: Numbers, outputs: Mapping[str, Numbers]) -> Numbers:
         """What observations depend on beside section state and offset."""
         return np.column_stack([each.after(states, outputs) for each in self._coordinates.values()])
 

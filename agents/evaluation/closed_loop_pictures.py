@@ -33,9 +33,7 @@ from .closed_loop_report import ClosedLoopReport, share_survived
 _DPI = 110
 _MARKERS = {"heading": "o", "lean": "^", "pitch": "s", "masses": "D"}
 _WHITE: Colour = (255, 255, 255)
-_ENDING_COLOURS = [
-    unit_colour(each) for each in (mixed(LIGHT_GREY, _WHITE, 0.5), *SERIES_COLOURS)
-]
+_ENDING_COLOURS = [unit_colour(each) for each in (mixed(LIGHT_GREY, _WHITE, 0.5), *SERIES_COLOURS)]
 """By ending, in the order of their codes: still walking, then the ways to fall."""
 _WORDS = {
     "ankle_angle": "ankle angle (rad)",
@@ -91,7 +89,15 @@ def _draw_plane(axes: Axes) -> None:
 def _mode_handles(reports: Sequence[ClosedLoopReport]) -> list[Line2D]:
     """Agents by colour, then modes by shape."""
     handles = [
-        Line2D([], [], color=agent_colour(report.agent), marker="o", linestyle="", markersize=8, label=report.agent)
+        Line2D(
+            [],
+            [],
+            color=agent_colour(report.agent),
+            marker="o",
+            linestyle="",
+            markersize=8,
+            label=report.agent,
+        )
         for report in reports
     ]
     handles += [
@@ -118,7 +124,9 @@ def save_basins(reports: Sequence[ClosedLoopReport], path: Path) -> None:
             place = axes[row, column]
             place.pcolormesh(found[x], found[y], found.ending.T, cmap=colours, norm=norm)
             place.plot(centre[x], centre[y], marker="+", color="black", markersize=9)
-            place.set_title(f"{report.agent}: {100.0 * share_survived(found):.0f} %", fontsize="medium")
+            place.set_title(
+                f"{report.agent}: {100.0 * share_survived(found):.0f} %", fontsize="medium"
+            )
             place.set_xlabel(_WORDS[x])
             seen |= set(np.unique(found.ending).tolist())
             if column == 0:

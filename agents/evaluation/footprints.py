@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
+from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.envs.tasks import Task
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.parameters import Foot, Vector, WalkerParameters
 from lean_yaw_env.rendering.figures import save_figure
@@ -80,7 +80,7 @@ def record_episode(
     chosen = EnvOptions() if options is None else options
     env = WalkerEnv(task, **vars(chosen))
     observation, info = env.reset(seed=seed)
-    walker = Walker(env.rows.body_parameters(0))  # a random body is drawn by the reset
+    walker = Walker(env.simulation.body_parameters(0))  # a random body is drawn by the reset
     attach(agent, env)
     infos, paths = [info], []
     places = [_goal_place(env)]
@@ -93,10 +93,10 @@ def record_episode(
         observation, _, terminated, truncated, info = env.step(action)
         paths.append(_path(walker, before, info))
         ends = terminated or truncated
-        if info["fall"] is None:
+        if info["fall"] == FallCode.NONE:
             infos.append(info)
             places.append(_goal_place(env))
-    memory = env.rows.memory[0].copy()
+    path = _reference_path(env)
     env.close()
     return RecordedEpisode(
         footprints=np.array([seen["footprint"] for seen in infos]),
@@ -104,20 +104,20 @@ def record_episode(
         stances=tuple(_foot(seen) for seen in infos),
         path=np.concatenate(paths) if paths else np.empty((0, 4)),
         commands=_commands(infos),
-        fall=info["fall"],
+        fall=FallCode(info["fall"]).word,
         terminated=bool(terminated),
-        goals=_goals(places, env.rows.task.goal_radius),
-        reference_path=_reference_path(env.rows.task, memory),
+        goals=_goals(places, env.task.goal_radius),
+        reference_path=path,
         body=walker.parameters,
     )
 
 
 def _goal_place(env: WalkerEnv) -> tuple[float, float] | None:
-    columns = env.rows.task.goal_columns
-    if columns is None:
+    fields = env.task.goal_fields
+    if fields is None:
         return None
-    downhill, right = env.rows.memory[0, list(columns)]
-    return float(downhill), float(right)
+    downhill, right = (float(env.simulation.tasks[name][0]) for name in fields)
+    return downhill, right
 
 
 def _goals(places: list[tuple[float, float] | None], radius: float) -> tuple[Goal, ...]:
@@ -127,8 +127,9 @@ def _goals(places: list[tuple[float, float] | None], radius: float) -> tuple[Goa
     )
 
 
-def _reference_path(task: Task, memory: Vector) -> Vector | None:
-    return None if task.reference_path is None else task.reference_path(memory)
+def _reference_path(env: WalkerEnv) -> Vector | None:
+    path = env.task.reference_path
+    return None if path is None else path(*env.simulation.records(0))
 
 
 def _foot(info: dict[str, Any]) -> Foot:

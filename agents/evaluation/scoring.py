@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from lean_yaw_env.envs import columns as c
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.envs.tasks import Task, task_named
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.parameters import Vector
@@ -126,7 +127,7 @@ def _run_chunk(
         now = starts & ~ended
         if now.any():
             # the default autoreset mode keeps an ended episode's memory until the next step
-            for name, values in _metrics(task, env.rows.memory[now]).items():
+            for name, values in _metrics(env.simulation, now).items():
                 metrics[name][now] = values
             survived[now] = truncated[now]
             ended |= now
@@ -141,22 +142,13 @@ def _metric_names(task: Task) -> tuple[str, ...]:
     return (RETURN, *task.metrics, SPEED)
 
 
-def _metrics(task: Task, memory: Vector) -> dict[str, Vector]:
-    """The task's metrics of ended episodes, from their rows of memory."""
-    found: dict[str, Vector] = {}
-    for name, metric in task.metrics.items():
-        values = memory[:, metric.column].copy()
-        if metric.divisor is not None:
-            values = _quotient(values, memory[:, metric.divisor])
-        found[name] = values
-    found[SPEED] = _quotient(memory[:, c.DISTANCE], memory[:, c.TIME])
-    return found
-
-
-def _quotient(numerator: Vector, denominator: Vector) -> Vector:
-    return np.divide(
-        numerator, denominator, out=np.full(len(numerator), np.nan), where=denominator > 0.0
-    )
+def _metrics(simulation: Simulation, ended: NDArray[np.bool_]) -> dict[str, Vector]:
+    """The task's metrics of ended episodes, from their records; NaN where there was nothing to measure."""
+    walkers, tasks = simulation.walkers[ended], simulation.tasks[ended]
+    found = simulation.task.measure(walkers, tasks, undefined=np.nan)
+    time = walkers["time"]
+    nowhere = np.full(len(time), np.nan)
+    return found | {SPEED: np.divide(walkers["distance"], time, out=nowhere, where=time > 0.0)}
 
 
 def _arguments(options: EnvOptions) -> dict[str, Any]:

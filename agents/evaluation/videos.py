@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from lean_yaw_env.envs import columns as c
+from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.pictures import Footage
+from lean_yaw_env.envs.state import Records
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.files import require_ending, written_whole
 from lean_yaw_env.parameters import Foot, Vector
@@ -164,8 +165,8 @@ def record_steps(
     env = WalkerEnv(task, **vars(EnvOptions() if options is None else options))
     observation, info = env.reset(seed=seed)
     attach(agent, env)
-    walker = Walker(env.rows.body_parameters(0))
-    footage = Footage(env.rows)
+    walker = Walker(env.simulation.body_parameters(0))
+    footage = Footage(env.simulation)
     steps: list[FilmedStep] = []
     state: State = None
     ended, now = False, 0.0
@@ -175,7 +176,7 @@ def record_steps(
         observation, _, terminated, truncated, info = env.step(action)
         footage.extend()
         ended = terminated or truncated
-        steps.append(_filmed(walker, scene, before, info, now, env.rows.settings))
+        steps.append(_filmed(walker, scene, before, info, now, env.simulation.settings))
         now = steps[-1].end
     env.close()
     return steps
@@ -187,7 +188,7 @@ def _filmed(
     before: dict[str, Any],
     after: dict[str, Any],
     now: float,
-    settings: Vector,
+    settings: Records,
 ) -> FilmedStep:
     foot: Foot = "left" if before["stance_side"] > 0.0 else "right"
     duration = max(float(after["duration"]), 1e-6)  # a fall at the start of a step lasts no time
@@ -214,16 +215,16 @@ def _filmed(
         centre=before["footprint"] + turned,
         angles=(float(before["inter_leg_angle"]), float(after["inter_leg_angle"])),
         push=_push(before, settings),
-        fall=after["fall"],
+        fall=FallCode(after["fall"]).word,
     )
 
 
-def _push(info: dict[str, Any], settings: Vector) -> tuple[float, float] | None:
+def _push(info: dict[str, Any], settings: Records) -> tuple[float, float] | None:
     if "pitch_push" not in info:
         return None
     return (
-        info["pitch_push"] / settings[c.PITCH_PUSH_SIZE],
-        info["ankle_push"] / settings[c.ANKLE_PUSH_SIZE],
+        float(info["pitch_push"] / settings["pitch_push"][0]),
+        float(info["ankle_push"] / settings["ankle_push"][0]),
     )
 
 

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.registration import TASK_VERSIONS
+from lean_yaw_env.registration import ALL_TASKS, GOAL_TASK, TASK_VERSIONS
 from lean_yaw_env.validation import require_choice
 
 from ..observations import ObservationLayout
 from ..policies.policy import Policy, PolicyCard, package_versions
 from ..policies.storage import task_of
 from ..settings import tuned
-from .gradient.learner import GradientLearner, GradientSettings
-from .gradient.tasks import FORMULAS
+from .apg import GradientLearner, GradientSettings
+from .her import HERLearner, HERSettings
 from .learner import LearnerSettings, MakeLearner, settings_to_plain, torch_threads
 from .ppo import PPOLearner, PPOSettings
 from .recorder import Recorder, Report, TrainingLog
@@ -37,20 +36,21 @@ class Algorithm:
 
     Attributes
     ----------
-    settings : class of its settings
+    settings : class of its settings, a ``LearnerSettings``
     make : its learner's class
-    tasks : names of those that it can learn
+    tasks : that it can learn
     """
 
-    settings: type[LearnerSettings]
+    settings: type[Any]
     make: MakeLearner
-    tasks: Collection[str] = tuple(TASK_VERSIONS)
+    tasks: tuple[str, ...] = ALL_TASKS
 
 
 ALGORITHMS: dict[str, Algorithm] = {
     "ppo": Algorithm(PPOSettings, PPOLearner),
     "sac": Algorithm(SACSettings, SACLearner),
-    "apg": Algorithm(GradientSettings, GradientLearner, FORMULAS),
+    "apg": Algorithm(GradientSettings, GradientLearner, tuple(TASK_VERSIONS)),
+    "her": Algorithm(HERSettings, HERLearner, (GOAL_TASK,)),
 }
 """By the names that their policies carry."""
 
@@ -64,9 +64,7 @@ def settings_for(algorithm: str, task: str) -> Any:
         For an algorithm or a task there is not, or a task that the algorithm cannot learn.
     """
     entry = ALGORITHMS[require_choice("algorithm", algorithm, ALGORITHMS)]
-    require_choice("task", task, TASK_VERSIONS)
-    if task not in entry.tasks:
-        raise ValueError(f"{algorithm} learns {', '.join(entry.tasks)}, not {task!r}")
+    require_choice(f"task of {algorithm}", task, entry.tasks)
     return tuned(algorithm, task, entry.settings())
 
 

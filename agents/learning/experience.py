@@ -7,25 +7,30 @@ steps, since a step's reward, spread evenly over its duration, is discounted wit
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from stable_baselines3.common.buffers import ReplayBuffer, RolloutBuffer
-from stable_baselines3.common.type_aliases import ReplayBufferSamples
+from stable_baselines3.common.type_aliases import DictReplayBufferSamples, ReplayBufferSamples
 from stable_baselines3.common.vec_env import VecNormalize
 
-from .recorder import Arrays
+from lean_yaw_env.envs.hindsight import HindsightReplay
 
-_COLUMNS = (
-    "observations", "next_observations", "actions", "rewards", "dones", "timeouts", "durations",
-)  # fmt: skip
+from .recorder import Arrays
 
 
 def mean_discount(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean of exp(-t / time constant) over steps of durations ``ratio`` times the time constant; 1 at its limit of no duration."""
     return np.where(ratio > 0.0, -np.expm1(-ratio) / np.where(ratio > 0.0, ratio, 1.0), 1.0)
+
+
+def named_arrays(name: str, value: Any) -> Arrays:
+    """An array, or each array of a dictionary, under a name of its own; views."""
+    if isinstance(value, dict):
+        return {f"{name}.{key}": each for key, each in value.items()}
+    return {name: np.asarray(value)}
 
 
 class TimeDiscountedBuffer(RolloutBuffer):
@@ -76,6 +81,10 @@ class TimeDiscountedReplay(ReplayBuffer):
     ``durations`` (steps, walkers) is to be filled before each ``add``.
     """
 
+    columns: ClassVar[tuple[str, ...]] = (
+        "observations", "next_observations", "actions", "rewards", "dones", "timeouts", "durations",
+    )  # fmt: skip
+
     def __init__(
         self, *arguments: Any, time_constant: float, typical_duration: float, **keywords: Any
     ) -> None:
@@ -86,8 +95,8 @@ class TimeDiscountedReplay(ReplayBuffer):
 
     def add(
         self,
-        obs: NDArray[Any],
-        next_obs: NDArray[Any],
+        obs: Any,
+        next_obs: Any,
         action: NDArray[Any],
         reward: NDArray[Any],
         done: NDArray[Any],
@@ -100,15 +109,22 @@ class TimeDiscountedReplay(ReplayBuffer):
     def captured(self) -> Arrays:
         """The experience there is, and where the next goes."""
         filled = self.buffer_size if self.full else self.pos
-        arrays: Arrays = {name: getattr(self, name)[:filled] for name in _COLUMNS}
+        arrays = {name: column[:filled] for name, column in self._columns().items()}
         return arrays | {"position": np.array([self.pos, filled])}
 
     def restore(self, arrays: Arrays) -> None:
         """Bring the buffer to what ``captured`` gave, or raise ``KeyError`` or ``ValueError`` if it is another buffer's."""
         self.pos, filled = (int(value) for value in arrays["position"])
         self.full = filled == self.buffer_size
-        for name in _COLUMNS:
-            getattr(self, name)[:filled] = arrays[name]
+        for name, column in self._columns().items():
+            column[:filled] = arrays[name]
+
+    def _columns(self) -> Arrays:
+        """All of the experience by name, one column for each key of a dictionary."""
+        columns: Arrays = {}
+        for name in self.columns:
+            columns |= named_arrays(name, getattr(self, name))
+        return columns
 
     def _get_samples(
         self, batch_inds: NDArray[np.int64], env: VecNormalize | None = None
@@ -127,3 +143,38 @@ class TimeDiscountedReplay(ReplayBuffer):
             rewards.astype(np.float32)[:, None],
         )
         return ReplayBufferSamples(*(self.to_torch(array) for array in data))
+
+
+class TimeDiscountedHindsight(TimeDiscountedReplay, HindsightReplay):
+    """Hindsight replay, discounted in time: to be at a goal at the time t is worth exp(-t / time constant)."""
+
+    columns: ClassVar[tuple[str, ...]] = (*TimeDiscountedReplay.columns, "ep_start", "ep_length")
+
+    def captured(self) -> Arrays:
+        """The experience there is, where the next goes, and where the episodes under way began."""
+        return super().captured() | {"under_way": self._current_ep_start.copy()}
+
+    def restore(self, arrays: Arrays) -> None:
+        """Bring the buffer to what ``captured`` gave; see ``TimeDiscountedReplay``."""
+        super().restore(arrays)
+        self._current_ep_start[:] = arrays["under_way"]
+
+    def _get_real_samples(
+        self, batch_indices: Any, env_indices: Any, env: VecNormalize | None = None
+    ) -> DictReplayBufferSamples:
+        samples = super()._get_real_samples(batch_indices, env_indices, env)
+        return self._discounted(samples, batch_indices, env_indices)
+
+    def _get_virtual_samples(
+        self, batch_indices: Any, env_indices: Any, env: VecNormalize | None = None
+    ) -> DictReplayBufferSamples:
+        samples = super()._get_virtual_samples(batch_indices, env_indices, env)
+        return self._discounted(samples, batch_indices, env_indices)
+
+    def _discounted(
+        self, samples: DictReplayBufferSamples, batch_indices: Any, env_indices: Any
+    ) -> DictReplayBufferSamples:
+        ratio = self.durations[batch_indices, env_indices] / self.time_constant
+        discount = self.to_torch(np.exp(-ratio).astype(np.float32)).reshape(-1, 1)
+        cut = 1.0 - (1.0 - samples.dones) * discount
+        return samples._replace(dones=cut, rewards=samples.rewards * discount)

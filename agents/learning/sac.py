@@ -10,15 +10,23 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from stable_baselines3 import SAC
+from stable_baselines3.common.vec_env import VecNormalize
 
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
+from lean_yaw_env.envs.sb3 import WalkerVecEnv
 from lean_yaw_env.validation import require_count, require_number
 
 from ..seeds import training_seed
 from .experience import TimeDiscountedReplay
 from .learner import GAIT_STEP, LearnerSettings, float_array
 from .recorder import Arrays, restoring, under
-from .sb3 import Falling, StableBaselinesLearner, training_environment
+from .sb3 import (
+    Falling,
+    StableBaselinesLearner,
+    captured_observations,
+    restored_observations,
+    training_environment,
+)
 
 _REPLAY = "replay."
 
@@ -81,6 +89,8 @@ class SACLearner(StableBaselinesLearner):
 
     activation = "relu"
     output = "tanh"
+    network = "MlpPolicy"
+    replay: type[Any] = TimeDiscountedReplay
 
     def __init__(
         self,
@@ -92,9 +102,9 @@ class SACLearner(StableBaselinesLearner):
         tensorboard: Path | None,
     ) -> None:
         first = training_seed(seed)
-        env, walkers = training_environment(env_id, settings, options, threads)
+        env, walkers = self.environment(env_id, settings, options, threads)
         model = EvenlyStartedSAC(
-            "MlpPolicy",
+            self.network,
             env,
             learning_rate=Falling.of(settings),
             buffer_size=settings.buffer_size,
@@ -106,12 +116,9 @@ class SACLearner(StableBaselinesLearner):
             gradient_steps=settings.gradient_steps,
             ent_coef=f"auto_{settings.initial_entropy_weight}",
             target_entropy=settings.target_entropy,
-            policy_kwargs={"net_arch": list(settings.hidden), "activation_fn": torch.nn.ReLU},
-            replay_buffer_class=TimeDiscountedReplay,
-            replay_buffer_kwargs={
-                "time_constant": settings.time_constant,
-                "typical_duration": GAIT_STEP,
-            },
+            policy_kwargs=self.network_arguments(settings, options),
+            replay_buffer_class=self.replay,
+            replay_buffer_kwargs=self.replay_arguments(settings),
             tensorboard_log=None if tensorboard is None else str(tensorboard),
             seed=seed,
             device="cpu",
@@ -129,6 +136,20 @@ class SACLearner(StableBaselinesLearner):
         super().__init__(model, self._replay, optimizers, settings.steps)
         self._depth = len(settings.hidden)
 
+    def environment(
+        self, env_id: str, settings: Any, options: EnvOptions, threads: int
+    ) -> tuple[VecNormalize, WalkerVecEnv]:
+        """The walkers that experience comes from."""
+        return training_environment(env_id, settings, options, threads)
+
+    def network_arguments(self, settings: Any, options: EnvOptions) -> dict[str, Any]:
+        """What the networks are made with."""
+        return {"net_arch": list(settings.hidden), "activation_fn": torch.nn.ReLU}
+
+    def replay_arguments(self, settings: Any) -> dict[str, Any]:
+        """What the buffer is made with."""
+        return {"time_constant": settings.time_constant, "typical_duration": GAIT_STEP}
+
     def layers(self) -> dict[str, str]:
         """The actor's hidden layers, the one that gives the mean action, and the one that gives the deviation."""
         hidden = {f"layers.{k}": f"actor.latent_pi.{2 * k}" for k in range(self._depth)}
@@ -137,7 +158,7 @@ class SACLearner(StableBaselinesLearner):
     def capture(self) -> Arrays:
         """With the replay buffer and the entropy's weight."""
         arrays = super().capture()
-        arrays["last.unnormalised"] = np.array(self.model._last_original_obs)
+        arrays |= captured_observations("last.unnormalised", self.model._last_original_obs)
         arrays["entropy.log_weight"] = float_array(self._log_entropy_weight)
         return arrays | {_REPLAY + name: array for name, array in self._replay.captured().items()}
 
@@ -146,6 +167,6 @@ class SACLearner(StableBaselinesLearner):
         super().restore(arrays)
         with restoring():
             self._replay.restore(under(_REPLAY, arrays))
-            self.model._last_original_obs = arrays["last.unnormalised"].copy()
+            self.model._last_original_obs = restored_observations("last.unnormalised", arrays)
             with torch.no_grad():
                 self._log_entropy_weight.copy_(torch.from_numpy(arrays["entropy.log_weight"]))

@@ -11,6 +11,7 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 from torch.optim import Optimizer
 
@@ -19,6 +20,7 @@ from lean_yaw_env.envs.sb3 import WalkerVecEnv
 
 from ..policies.policy import NORMALISATION_FLOOR, NORMALISED_LIMIT
 from ..policies.storage import task_of
+from .experience import named_arrays
 from .learner import LearnerSettings, float_array, optimizer_arrays, restore_optimizer
 from .recorder import Arrays, EndedEpisode, Recorder, restoring, under
 
@@ -140,7 +142,8 @@ class StableBaselinesLearner:
     def weights(self) -> dict[str, NDArray[np.float32]]:
         """The policy's numbers, with the statistics that normalise its observations; see ``Learner``."""
         tensors = self.model.policy.state_dict()
-        moments: Any = self._normaliser.obs_rms
+        features = tensors[f"{self.layers()['layers.0']}.weight"].shape[1]
+        moments = self._moments().get("observations", RunningMeanStd(shape=(features,)))
         weights = {
             "observation_mean": np.asarray(moments.mean, dtype=np.float32),
             "observation_variance": np.asarray(moments.var, dtype=np.float32),
@@ -156,11 +159,11 @@ class StableBaselinesLearner:
         arrays: Arrays = {
             "count.steps": np.array(model.num_timesteps),
             "count.updates": np.array(model._n_updates),
-            "last.observations": np.array(model._last_obs),
             "last.starts": np.array(model._last_episode_starts),
             "normaliser.returns": normaliser.returns,
             "random.torch": torch.get_rng_state().numpy(),
         }
+        arrays |= captured_observations("last.observations", model._last_obs)
         arrays |= {
             f"policy.{k}": v.detach().cpu().numpy() for k, v in model.policy.state_dict().items()
         }
@@ -190,13 +193,30 @@ class StableBaselinesLearner:
             self._walkers.restore(under("walkers.", arrays))
             model.num_timesteps = int(arrays["count.steps"])
             model._n_updates = int(arrays["count.updates"])
-            model._last_obs = arrays["last.observations"].copy()
+            model._last_obs = restored_observations("last.observations", arrays)
             model._last_episode_starts = arrays["last.starts"].copy()
             torch.set_rng_state(torch.from_numpy(arrays["random.torch"].copy()))
             _restore_numpy_random(arrays)
 
     def _moments(self) -> dict[str, Any]:
-        return {"observations": self._normaliser.obs_rms, "returns": self._normaliser.ret_rms}
+        returns = {"returns": self._normaliser.ret_rms}
+        return (
+            {"observations": self._normaliser.obs_rms} | returns
+            if self._normaliser.norm_obs
+            else returns
+        )
+
+
+def captured_observations(name: str, observations: Any) -> Arrays:
+    """Copies of observations, each array of a dictionary under a name of its own."""
+    return {key: np.array(each) for key, each in named_arrays(name, observations).items()}
+
+
+def restored_observations(name: str, arrays: Arrays) -> Any:
+    """What ``captured_observations`` was given."""
+    if name in arrays:
+        return arrays[name].copy()
+    return {key: each.copy() for key, each in under(f"{name}.", arrays).items()}
 
 
 def _numpy_random() -> Arrays:

@@ -11,7 +11,7 @@ from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.files import read_json, write_json, written_whole
 from lean_yaw_env.parameters import WalkerParameters
-from lean_yaw_env.registration import ENV_IDS, NAMESPACE
+from lean_yaw_env.registration import ALL_ENV_IDS, NAMESPACE
 
 from ..observations import ObservationLayout
 from .policy import Policy, PolicyCard, require_algorithm
@@ -163,16 +163,16 @@ def _shipped_home(env_id: str, algorithm: str) -> Path:
 
 def require_env_id(env_id: str) -> str:
     """The id of an environment of this package, or ``PolicyFileError`` that says what to do."""
-    if env_id in ENV_IDS:
+    if env_id in ALL_ENV_IDS:
         return env_id
     name, _, _ = env_id.partition("-v")
-    versions = [known for known in ENV_IDS if known.startswith(f"{name}-v")]
+    versions = [known for known in ALL_ENV_IDS if known.startswith(f"{name}-v")]
     if versions:
         raise PolicyFileError(
             f"this package's environment is {versions[0]}, not {env_id}: their observations or rewards differ; "
             "train a policy anew or install the package that trained it"
         )
-    raise PolicyFileError(f"env_id must be one of {', '.join(ENV_IDS)}, got {env_id!r}")
+    raise PolicyFileError(f"env_id must be one of {', '.join(ALL_ENV_IDS)}, got {env_id!r}")
 
 
 def task_of(env_id: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -22,9 +22,10 @@ from lean_yaw_env.analysis.section_map import (
     CycleStep,
     Linearised,
     SectionMap,
+    require_offsets,
     section_map_of,
 )
-from lean_yaw_env.analysis.stride import differentiate_step, require_offsets
+from lean_yaw_env.analysis.step_derivatives import BY_BODY, BY_STATE, differentiate_step
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.batch import step_batch
 from lean_yaw_env.kernel.records import Command, Outcome
@@ -108,10 +109,6 @@ class ActiveMap(SectionMap):
         return [0, 1, 2, 3, 4] if has_downhill(self.walker.parameters) else [1, 2, 3, 4]
 
     @property
-    def stander(self) -> Walker:
-        return self.walker
-
-    @property
     def carried(self) -> float:
         """The offset that the step before has left."""
         return self.mass_offset[1]
@@ -124,16 +121,7 @@ class ActiveMap(SectionMap):
         steps: list[CycleStep] = []
         for k in range(self.n_steps):
             command, foot = self._command(k), FEET_IN_TURN[k % 2]
-            result = require_completed(
-                self.walker.step(
-                    state,
-                    stance=foot,
-                    inter_leg_angle=command[0],
-                    mass_offset=command[1],
-                    previous_offset=command[2],
-                ),
-                f"step {k + 1} of the gait",
-            )
+            result = completed_step(self.walker, state, foot, command, k)
             if abs(result.mass_offset - command[1]) > _ARRIVED:
                 raise NoGaitError(
                     f"the heel strike after {result.duration:.3f} comes before the masses have "
@@ -144,18 +132,18 @@ class ActiveMap(SectionMap):
         return steps
 
     def linear_step(self, state: Vector, k: int, parameter: str | None) -> Linearised:
-        step = differentiate_step(
-            self.walker, state, FEET_IN_TURN[k % 2], self._command(k), with_body=parameter is not None
-        )
-        by_parameter = np.zeros(STATE_SIZE)
+        inputs = BY_STATE if parameter is None else BY_BODY
+        foot, command = FEET_IN_TURN[k % 2], self._command(k)
+        step = differentiate_step(self.walker, state, foot, command, inputs=inputs)
+        by_parameter, exact = np.zeros(STATE_SIZE), np.zeros((STATE_SIZE, STATE_SIZE))
         if parameter is not None:
             by_inputs = step.jacobian[:STATE_SIZE, STATE_SIZE:]
             by_parameter = by_inputs @ self._direction(parameter, k)
-        return Linearised(
-            step.state, step.by_state, by_parameter, np.zeros((STATE_SIZE, STATE_SIZE))
-        )
+        return Linearised(step.state, step.by_state, by_parameter, exact)
 
-    def step_many(self, states: Vector, carried: Vector, foot: int) -> tuple[Vector, Vector, Vector]:
+    def step_many(
+        self, states: Vector, carried: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
         n = len(states)
         commands = np.column_stack(
             [np.full(n, self.inter_leg_angle), np.full(n, self.mass_offset[foot]), carried]
@@ -167,43 +155,30 @@ class ActiveMap(SectionMap):
         yield search_active(self, exact=True)
 
     def value(self, parameter: str) -> float:
-        require_choice("parameter", parameter, self.parameters)
         left, right = self.mass_offset
         commands = {
             "inter_leg_angle": self.inter_leg_angle,
             "mass_offset": 0.5 * (left + right),
             "alternating_offset": 0.5 * (left - right),
         }
-        if parameter in commands:
-            return commands[parameter]
-        return getattr(self.walker.parameters, parameter)
+        return commands[parameter] if parameter in commands else super().value(parameter)
 
     def moved(self, parameter: str, value: float) -> Self:
-        require_choice("parameter", parameter, self.parameters)
         if parameter == "inter_leg_angle":
             return replace(self, inter_leg_angle=require_inter_leg_angle(value))
-        if parameter == "mass_offset":
-            apart = self.value("alternating_offset")
-            return replace(self, mass_offset=(value + apart, value - apart))
-        if parameter == "alternating_offset":
-            mean = self.value("mass_offset")
-            return replace(self, mass_offset=(mean + value, mean - value))
-        return replace(self, walker=moved_walker(self.walker, parameter, value))
-
-    def over(self, n_steps: int) -> Self:
-        return replace(self, n_steps=n_steps)
+        if parameter in ("mass_offset", "alternating_offset"):
+            offsets = {name: self.value(name) for name in COMMAND_PARAMETERS[1:]}
+            mean, apart = {**offsets, parameter: value}.values()
+            return replace(self, mass_offset=(mean + apart, mean - apart))
+        return super().moved(parameter, value)
 
     def along(self, parameter: str) -> Self:
         # the same offset for both feet, but for none, is no mirror image of itself
         return self.over(2) if parameter == "mass_offset" and self.n_steps == 1 else self
 
     def question(self) -> dict[str, Any]:
-        return {
-            "walker": "Walker",
-            "parameters": asdict(self.walker.parameters),
-            "inter_leg_angle": self.inter_leg_angle,
-            "mass_offset": list(self.mass_offset),
-        }
+        command = [self.inter_leg_angle, *self.mass_offset]
+        return {**super().question(), "command": command}
 
     @cached_property
     def _bodies(self) -> Vector:
@@ -233,9 +208,15 @@ def has_downhill(parameters: WalkerParameters) -> bool:
     return parameters.slope != 0.0 and not parameters.slope_turns
 
 
-def moved_walker(walker: Walker, parameter: str, value: float) -> Walker:
-    """The walker with another value of one of ``BODY_PARAMETERS``."""
-    return Walker(replace(walker.parameters, **{parameter: value}))
+def completed_step(
+    walker: Walker, state: Vector, foot: Foot, command: Command, k: int
+) -> StepResult:
+    """Step ``k`` of a gait, or ``FellError``."""
+    angle, offset, before = command
+    result = walker.step(
+        state, stance=foot, inter_leg_angle=angle, mass_offset=offset, previous_offset=before
+    )
+    return require_completed(result, f"step {k + 1} of the gait")
 
 
 def step_rows(bodies: Vector, commands: Vector, states: Vector, foot: int) -> Vector:
@@ -271,12 +252,9 @@ def _(
     *,
     inter_leg_angle: float = INTER_LEG_ANGLE,
     mass_offset: float | tuple[float, float] = 0.0,
-    n_steps: int | None = None,
 ) -> ActiveMap:
     offsets = require_offsets(mass_offset)
-    fewest = 1 if offsets[0] == -offsets[1] else 2
-    angle = require_inter_leg_angle(inter_leg_angle)
-    return ActiveMap(walker, angle, offsets, fewest if n_steps is None else n_steps)
+    return ActiveMap(walker, inter_leg_angle, offsets, 1 if offsets[0] == -offsets[1] else 2)
 
 
 def planar_gait_rate(walker: Walker, inter_leg_angle: float, heading: float = 0.0) -> float:

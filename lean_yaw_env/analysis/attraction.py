@@ -80,7 +80,7 @@ def basin(
     require_count("n_steps", n_steps, 1, 1_000_000)
     section_map = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
     cycle = find_limit_cycle(section_map) if centre is None else None
-    middle = section_map.require_state(centre if cycle is None else cycle.state)
+    middle = cycle.state if cycle is not None else section_map.require_state(np.asarray(centre))
     axes = {name: _axis(section_map, name, values) for name, values in (x, y)}
     if len(axes) != 2:
         raise ValueError(f"x and y must be different coordinates, got {x[0]!r} twice")
@@ -346,6 +346,8 @@ def _dataset(
         coords=axes,
         attrs={
             "question": json.dumps({**section_map.question(), "n_steps": n_steps}, sort_keys=True),
-            "centre": json.dumps(dict(zip(section_map.names, centre.round(12).tolist(), strict=True))),
+            "centre": json.dumps(
+                dict(zip(section_map.names, centre.round(12).tolist(), strict=True))
+            ),
         },
     )

@@ -9,14 +9,19 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lean_yaw_env.analysis.active_map import cycle_step, has_downhill, moved_walker, step_rows
+from lean_yaw_env.analysis.active_map import (
+    completed_step,
+    cycle_step,
+    has_downhill,
+    step_rows,
+)
 from lean_yaw_env.analysis.fixed_point import solve_fixed_point
 from lean_yaw_env.analysis.many_walks import walk_many
 from lean_yaw_env.analysis.section_map import (
@@ -29,16 +34,16 @@ from lean_yaw_env.analysis.section_map import (
     SectionMap,
 )
 from lean_yaw_env.analysis.slopes import Slopes, slopes_of
-from lean_yaw_env.analysis.stride import differentiate_step
+from lean_yaw_env.analysis.step_derivatives import BY_BODY, BY_COMMAND, differentiate_step
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.jacobian import OUTPUTS
 from lean_yaw_env.kernel.records import STEPPED, Command, Outcome
 from lean_yaw_env.parameters import MIRROR, STATE_FIELDS, STATE_SIZE, Foot, Vector, require_state
 from lean_yaw_env.validation import require_array, require_choice, require_count
-from lean_yaw_env.walker import Walker, require_completed
+from lean_yaw_env.walker import Walker
 
 if TYPE_CHECKING:
-    from typing_extensions import Self
+    pass
 
 OFFSET, MEMORY = STATE_SIZE, STATE_SIZE + 1
 """Where a state holds the mass offset in force, and the first coordinate of what else it remembers."""
@@ -49,6 +54,8 @@ _TINY = 1e-30
 _STATUS = Outcome._fields.index("status")
 _OFFSET_OUT = Outcome._fields.index("mass_offset")
 
+Numbers = NDArray[Any]
+"""Real numbers, or complex ones whose imaginary parts carry a derivative."""
 Predict = Callable[[NDArray[np.float32]], ArrayLike]
 """A controller: from observations (n, m) to actions (n, 2). It answers the same observation always the same."""
 
@@ -81,7 +88,7 @@ class ControlInterface(Protocol):
         """Inter-leg angles and mass offsets (n, 2), in space, that actions (n, 2) in these states mean."""
         ...
 
-    def remember(self, states: Vector, outputs: Mapping[str, Vector]) -> Vector:
+    def remember(self, states: Numbers, outputs: Mapping[str, Numbers]) -> Numbers:
         """What steps leave behind, (n, len(remembered)).
 
         ``outputs`` holds arrays (n,) by the names of ``kernel.jacobian.OUTPUTS``. Both may be complex numbers, which carry derivatives.
@@ -129,7 +136,7 @@ class ClosedLoopMap(SectionMap):
 
     @property
     def motions(self) -> tuple[Motion, ...]:
-        known = {**MOTIONS, **self.interface.remembered}
+        known: dict[str, Motion] = {**MOTIONS, **self.interface.remembered}
         return tuple(known[name] for name in self.names)
 
     @property
@@ -141,10 +148,6 @@ class ClosedLoopMap(SectionMap):
     def mirror(self) -> Vector:
         raise ValueError("a closed loop's steps have no mirror image: n_steps must be even")
 
-    @property
-    def stander(self) -> Walker:
-        return self.walker
-
     def require_state(self, state: ArrayLike) -> Vector:
         array = require_array("state", state, (len(self.names),))
         require_state(array[:STATE_SIZE])
@@ -155,16 +158,7 @@ class ClosedLoopMap(SectionMap):
         for k in range(self.n_steps):
             foot = FEET_IN_TURN[k % 2]
             command = self._command(state, self.commands(state[None], foot)[0])
-            result = require_completed(
-                self.walker.step(
-                    state[:STATE_SIZE],
-                    stance=foot,
-                    inter_leg_angle=command[0],
-                    mass_offset=command[1],
-                    previous_offset=command[2],
-                ),
-                f"step {k + 1}",
-            )
+            result = completed_step(self.walker, state[:STATE_SIZE], foot, command, k)
             values = (
                 *result.state, result.duration, *result.displacement, result.mass_offset, result.energy.shift_work
             )  # fmt: skip
@@ -198,9 +192,8 @@ class ClosedLoopMap(SectionMap):
         foot = FEET_IN_TURN[k % 2]
         asked = self.slopes(state, foot)
         command = self._command(state, asked.values)
-        step = differentiate_step(
-            self.walker, state[:STATE_SIZE], foot, command, with_body=parameter is not None
-        )
+        inputs = BY_COMMAND if parameter is None else BY_BODY
+        step = differentiate_step(self.walker, state[:STATE_SIZE], foot, command, inputs=inputs)
         # by the state, the two commands and the parameter
         size = len(state)
         wide = np.zeros((len(OUTPUTS), size + 3))
@@ -209,7 +202,7 @@ class ClosedLoopMap(SectionMap):
         wide[:, size : size + 2] = step.jacobian[:, STATE_SIZE : STATE_SIZE + 2]
         if parameter is not None:
             index = BODY_PARAMETERS.index(require_choice("parameter", parameter, self.parameters))
-            wide[:, size + 2] = step.jacobian[:, STATE_SIZE + 3 + index]
+            wide[:, size + 2] = step.jacobian[:, BY_COMMAND + index]
         image, found = self._after(state, step.outputs, wide)
         by_command = found[:, size : size + 2]
         return Linearised(
@@ -223,12 +216,18 @@ class ClosedLoopMap(SectionMap):
         """The state after a step with outputs (10,), and its derivatives (k, m) from those of the outputs (10, m)."""
         n = wide.shape[1]
         before = state + 1j * _TINY * np.eye(n, len(state))
-        named = dict(zip(OUTPUTS, outputs[:, None] + 1j * _TINY * wide, strict=True))
+        named: dict[str, Numbers] = dict(
+            zip(OUTPUTS, outputs[:, None] + 1j * _TINY * wide, strict=True)
+        )
         left = self.interface.remember(before, named)
-        moved = np.column_stack([*(named[each.name] for each in STATE_FIELDS), named["mass_offset"], left])
-        return moved[0].real.copy(), moved.imag.T / _TINY
+        moved = np.column_stack(
+            [*(named[each.name] for each in STATE_FIELDS), named["mass_offset"], left]
+        )
+        return np.real(moved[0]).copy(), np.imag(moved).T / _TINY
 
-    def step_many(self, states: Vector, carried: Vector, foot: int) -> tuple[Vector, Vector, Vector]:
+    def step_many(
+        self, states: Vector, carried: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
         asked = self.commands(states, FEET_IN_TURN[foot])
         rows = step_rows(
             self._bodies, np.column_stack([asked, states[:, OFFSET]]), states[:, :STATE_SIZE], foot
@@ -262,24 +261,8 @@ class ClosedLoopMap(SectionMap):
             + "; ".join(tried)
         )
 
-    def value(self, parameter: str) -> float:
-        require_choice("parameter", parameter, self.parameters)
-        return getattr(self.walker.parameters, parameter)
-
-    def moved(self, parameter: str, value: float) -> Self:
-        """The same controller on another body; what it observes and commands stays as it is."""
-        require_choice("parameter", parameter, self.parameters)
-        return replace(self, walker=moved_walker(self.walker, parameter, value))
-
-    def over(self, n_steps: int) -> Self:
-        return replace(self, n_steps=n_steps)
-
     def question(self) -> dict[str, Any]:
-        return {
-            "walker": "ClosedLoopMap",
-            "parameters": asdict(self.walker.parameters),
-            "controller": self._fingerprint,
-        }
+        return {**super().question(), "controller": self._fingerprint}
 
     @cached_property
     def _bodies(self) -> Vector:

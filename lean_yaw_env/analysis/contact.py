@@ -94,7 +94,9 @@ def floor_demand(
             mass_offset=offset,
             previous_offset=before,
         )
-        named = {name: motion[name] for name in ("time", "normal_force", "friction_demand", "yaw_torque")}
+        named = {
+            name: motion[name] for name in ("time", "normal_force", "friction_demand", "yaw_torque")
+        }
         demands.append(StepDemand(stance=step.foot, **named))
     normal = np.concatenate([demand.normal_force for demand in demands])
     return FloorDemand(

@@ -12,7 +12,13 @@ from lean_yaw_env.analysis.section_map import RESIDUAL_LIMIT, SectionMap
 from lean_yaw_env.errors import LeanYawError, NoGaitError
 from lean_yaw_env.parameters import Vector
 
-__all__ = ["RESIDUAL_LIMIT", "follow_fixed_point", "least_change", "side_of_folds", "solve_fixed_point"]
+__all__ = [
+    "RESIDUAL_LIMIT",
+    "follow_fixed_point",
+    "least_change",
+    "side_of_folds",
+    "solve_fixed_point",
+]
 
 _NEWTON_STEPS = 30
 _SHARES = (1.0, 0.5, 0.25, 0.125)
@@ -56,7 +62,7 @@ def least_change(matrix: Vector, wanted: Vector, precision: float) -> Vector:
 
     ``precision`` is the size, relative to the largest, from which a singular value counts as zero.
     """
-    return np.linalg.lstsq(matrix, wanted, rcond=precision)[0]
+    return np.asarray(np.linalg.lstsq(matrix, wanted, rcond=precision)[0], dtype=float)
 
 
 def side_of_folds(section_map: SectionMap, state: Vector) -> float:

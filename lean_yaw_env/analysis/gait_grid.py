@@ -6,20 +6,19 @@ walked anyway, and takes another only where the residual does not fall fast.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lean_yaw_env.analysis.section_map import RESIDUAL_LIMIT
 from lean_yaw_env.kernel.batch import step_batch
-from lean_yaw_env.kernel.jacobian import INPUTS
-from lean_yaw_env.kernel.jacobians import step_jacobians
+from lean_yaw_env.kernel.jacobian import step_jacobians
 from lean_yaw_env.kernel.records import STEPPED, Body, Outcome
 from lean_yaw_env.parameters import MIRROR, QUARTER_TURN, STATE_SIZE, Vector
 from lean_yaw_env.threads import share_out
 
-_JACOBIANS = 3
+_JACOBIANS = 6
 """Most exact ones on the way to a fixed point."""
 _FAST = 0.7
 """A step that leaves more of the residual than this share asks for a new Jacobian."""
@@ -47,6 +46,8 @@ class WalkerGrid:
     inter_leg_angles : shape (n,)
     offsets : shape (n, 2)
         In force while the left and while the right foot stands.
+    is_symmetric : shape (n,)
+        Whether right steps mirror left ones; a gait is then a fixed point of one mirrored step, otherwise of a stride.
     threads : int
         That share each batch.
     """
@@ -54,6 +55,7 @@ class WalkerGrid:
     bodies: Vector
     inter_leg_angles: Vector
     offsets: Vector
+    is_symmetric: Flags
     threads: int = 1
 
     @property
@@ -63,21 +65,19 @@ class WalkerGrid:
     def at(self, index: Index | Flags) -> WalkerGrid:
         """Some of the walkers."""
         return WalkerGrid(
-            self.bodies[index], self.inter_leg_angles[index], self.offsets[index], self.threads
+            self.bodies[index],
+            self.inter_leg_angles[index],
+            self.offsets[index],
+            self.is_symmetric[index],
+            self.threads,
         )
 
-    def towards(self, share: Vector) -> WalkerGrid:
-        """With hip width and offsets at a share of their own, shape (n,)."""
+    def towards(self, share: Vector, *, width_first: bool) -> WalkerGrid:
+        """On the way (n,), from 0 to 1, from no hip width and no offset: both grow together, or the offsets in the second half."""
+        width, offset = (2.0 * share, 2.0 * share - 1.0) if width_first else (share, share)
         bodies = self.bodies.copy()
-        bodies[:, _HIP_WIDTH] *= share
-        return WalkerGrid(
-            bodies, self.inter_leg_angles, self.offsets * share[:, None], self.threads
-        )
-
-    @property
-    def is_symmetric(self) -> Flags:
-        """Whether right steps mirror left ones, shape (n,)."""
-        return self.offsets[:, 0] == -self.offsets[:, 1]
+        bodies[:, _HIP_WIDTH] *= np.minimum(width, 1.0)
+        return replace(self, bodies=bodies, offsets=self.offsets * np.maximum(offset, 0.0)[:, None])
 
     @property
     def has_downhill(self) -> Flags:
@@ -97,9 +97,7 @@ class WalkerGrid:
         commands, sides = self.commands(foot), np.full(n, 1.0 - 2.0 * foot)
         states = np.ascontiguousarray(states)
         share_out(
-            lambda first, last: step_batch(
-                self.bodies, commands, states, sides, rows, first, last
-            ),
+            lambda first, last: step_batch(self.bodies, commands, states, sides, rows, first, last),
             n,
             self.threads,
         )
@@ -109,7 +107,7 @@ class WalkerGrid:
         """States (n, 5) after a step, its Jacobians (n, 5, 5), and whether it was completed (n,)."""
         n = self.n
         statuses, afters = np.empty(n), np.empty((n, STATE_SIZE))
-        rows = np.empty((n, STATE_SIZE, INPUTS))
+        rows = np.empty((n, STATE_SIZE, STATE_SIZE))
         commands, sides = self.commands(foot), np.full(n, 1.0 - 2.0 * foot)
         states = np.ascontiguousarray(states)
         share_out(
@@ -119,7 +117,7 @@ class WalkerGrid:
             n,
             self.threads,
         )
-        return afters, rows[:, :, :STATE_SIZE].copy(), statuses == STEPPED
+        return afters, rows, statuses == STEPPED
 
     def residual(self, states: Vector) -> tuple[Vector, Flags]:
         """Change (n, 5) over a mirrored step of symmetric walkers, over a stride of others, and whether it was completed (n,).
@@ -180,26 +178,46 @@ def solve_grid(grid: WalkerGrid, guesses: Vector) -> GridGaits:
 def follow_grid(grid: WalkerGrid, starts: Vector) -> GridGaits:
     """Follow each gait from no hip width and no offset, where ``starts`` (n, 5) are gaits.
 
-    So the gait found is of that branch, where several exist, and none beyond a fold.
+    So the gait found is of that branch, where several exist, and none beyond a fold. A narrow walker stands no offset: where hip width and
+    offsets cannot grow together, the offsets grow last.
     """
+    search = _Search(grid.n)
+    found = np.zeros(grid.n, dtype=bool)
+    _follow(grid, starts, search, np.flatnonzero(_is_sane(starts)), found, width_first=False)
+    rest = np.flatnonzero(~found & _is_sane(starts) & (grid.offsets != 0.0).any(axis=1))
+    _follow(grid, starts, search, rest, found, width_first=True)
+    return _described(grid, search, found)
+
+
+def _follow(
+    grid: WalkerGrid,
+    starts: Vector,
+    search: _Search,
+    who: Index,
+    found: Flags,
+    *,
+    width_first: bool,
+) -> None:
+    """Follow the gaits of some walkers, and say in ``found`` which have come to their end."""
     n = grid.n
-    search = _Search(n)
     reached, piece = np.zeros(n), np.full(n, _FIRST_PIECE)
     latest, earlier, reached_before = starts.copy(), starts.copy(), np.full(n, np.nan)
-    flying = search.begin(grid.towards(reached), starts)
+    at_start = grid.at(who).towards(reached[who], width_first=width_first)
+    flying = search.begin(at_start, starts[who], who)
     while flying.size:
         target = np.minimum(1.0, reached[flying] + piece[flying])
         span = reached[flying] - reached_before[flying]
         share = np.where(np.isnan(span), 0.0, (target - reached[flying]) / span)
         guess = latest[flying] + share[:, None] * (latest[flying] - earlier[flying])
-        done = search.solve(grid.at(flying).towards(target), guess, flying, target == 1.0)
+        there = grid.at(flying).towards(target, width_first=width_first)
+        done = search.solve(there, guess, flying, target == 1.0)
         good, bad = flying[done], flying[~done]
         earlier[good], latest[good] = latest[good], search.states[good]
         reached_before[good], reached[good] = reached[good], target[done]
         piece[good] *= 1.5
         piece[bad] *= 0.25
         flying = flying[(reached[flying] < 1.0) & (piece[flying] >= _SMALLEST_PIECE)]
-    return _described(grid, search, reached >= 1.0)
+    found[who] = reached[who] >= 1.0
 
 
 class _Search:
@@ -219,14 +237,13 @@ class _Search:
         self._inverse = np.full((n, STATE_SIZE, STATE_SIZE), np.nan)
         self._side = np.zeros(n)
 
-    def begin(self, grid: WalkerGrid, states: Vector) -> Index:
-        """Start from fixed points (n, 5); which of the walkers can. From then on gaits on the other side of a fold are no solutions."""
-        index = np.flatnonzero(_is_sane(states))
-        residual, stepped = grid.at(index).residual(states[index])
-        index = index[stepped & (_size(residual) <= _ON_THE_WAY)]
-        index = index[self._renew(grid.at(index), states[index], index)]
-        self._side[index] = np.sign(np.linalg.det(self._inverse[index]))
-        return index
+    def begin(self, grid: WalkerGrid, states: Vector, who: Index) -> Index:
+        """Start walkers from fixed points (m, 5); those that can. From then on their gaits on the other side of a fold are no solutions."""
+        residual, stepped = grid.residual(states)
+        able = np.flatnonzero(stepped & (_size(residual) <= _ON_THE_WAY))
+        able = able[self._renew(grid.at(able), states[able], who[able])]
+        self._side[who[able]] = np.sign(np.linalg.det(self._inverse[who[able]]))
+        return who[able]
 
     def solve(self, grid: WalkerGrid, guesses: Vector, who: Index, is_last: Flags) -> Flags:
         """Search from guesses (m, 5) for the fixed points of a grid of the m walkers ``who``; whether each was found (m,).
@@ -301,7 +318,8 @@ def _size(changes: Vector) -> Vector:
 
 
 def _is_sane(states: Vector) -> Flags:
-    return np.isfinite(states).all(axis=1) & (np.abs(states[:, 1:3]) < QUARTER_TURN).all(axis=1)
+    is_upright = np.abs(states[:, 1:3]) < QUARTER_TURN
+    return np.isfinite(states).all(axis=1) & np.all(is_upright, axis=1)
 
 
 def _described(grid: WalkerGrid, search: _Search, found: Flags) -> GridGaits:

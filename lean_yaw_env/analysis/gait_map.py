@@ -234,7 +234,9 @@ def _(
     starts[:, 1] = 0.5 * grid.inter_leg_angles
     starts[:, 3] = [
         planar_rate(*each, 0.0)
-        for each in zip(radius.tolist(), slope.tolist(), grid.inter_leg_angles.tolist(), strict=True)
+        for each in zip(
+            radius.tolist(), slope.tolist(), grid.inter_leg_angles.tolist(), strict=True
+        )
     ]
     gaits = follow_grid(grid, starts)
     values = _columns(section_map, grid, gaits, gaits.found)
@@ -281,9 +283,7 @@ def _one_by_one(
     return values
 
 
-def _walker_grid(
-    section_map: ActiveMap, points: Mapping[str, Vector], threads: int
-) -> WalkerGrid:
+def _walker_grid(section_map: ActiveMap, points: Mapping[str, Vector], threads: int) -> WalkerGrid:
     """The walkers at some points, as arrays."""
     n = len(next(iter(points.values())))
     bodies = np.tile(np.array(section_map.walker.parameters.body()), (n, 1))
@@ -295,7 +295,8 @@ def _walker_grid(
         bodies[:, Body._fields.index(name)] = points[name]
     mean, apart = commands["mass_offset"], commands["alternating_offset"]
     offsets = np.column_stack([mean + apart, mean - apart])
-    return WalkerGrid(bodies, commands["inter_leg_angle"], offsets, threads)
+    symmetric = np.full(n, section_map.n_steps % 2 == 1)
+    return WalkerGrid(bodies, commands["inter_leg_angle"], offsets, symmetric, threads)
 
 
 def _columns(

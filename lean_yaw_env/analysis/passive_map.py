@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -42,7 +42,7 @@ from lean_yaw_env.validation import require_choice, require_count
 from lean_yaw_env.walker import SIDE, Walker, raise_for_failure
 
 if TYPE_CHECKING:
-    from typing_extensions import Self
+    pass
 
 # Stance pitch over the scaling law's, and rate over pitch: 0.94 to 1.16 and 0.79 to 1.05 in the
 # gaits of point feet and of radius 0.5; other radii in between and somewhat beyond.
@@ -131,7 +131,9 @@ class PassiveMap(SectionMap):
             by_parameter = rows[:, size + BODY_PARAMETERS.index(parameter)]
         return Linearised(after, rows[:, :size], by_parameter, np.zeros((size, size)))
 
-    def step_many(self, states: Vector, carried: Vector, foot: int) -> tuple[Vector, Vector, Vector]:
+    def step_many(
+        self, states: Vector, carried: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
         sides = np.full(len(states), 1.0 - 2.0 * foot)
         rows = step_passive_rows(self.walker, states, sides, carried)
         return rows[:, :PASSIVE_STATE_SIZE], rows[:, _ANGLE], rows[:, _STATUS]
@@ -161,24 +163,8 @@ class PassiveMap(SectionMap):
         """The section state of the gait that the planar one of the longest period leads to, or ``NoGaitError``."""
         return self._widened(planar_gaits(_planar_parameters(self.walker.parameters))[0])
 
-    def value(self, parameter: str) -> float:
-        require_choice("parameter", parameter, self.parameters)
-        return getattr(self.walker.parameters, parameter)
-
-    def moved(self, parameter: str, value: float) -> Self:
-        require_choice("parameter", parameter, self.parameters)
-        changed = replace(self.walker.parameters, **{parameter: value})
-        return replace(self, walker=replace(self.walker, parameters=changed))
-
-    def over(self, n_steps: int) -> Self:
-        return replace(self, n_steps=n_steps)
-
     def question(self) -> dict[str, Any]:
-        return {
-            "walker": "PassiveWalker",
-            "parameters": asdict(self.walker.parameters),
-            "planar": self.walker.planar,
-        }
+        return {**super().question(), "planar": self.walker.planar}
 
     @cached_property
     def _body(self):
@@ -202,10 +188,9 @@ def _(
     *,
     inter_leg_angle: float = INTER_LEG_ANGLE,
     mass_offset: float | tuple[float, float] = 0.0,
-    n_steps: int | None = None,
 ) -> PassiveMap:
     require_no_command("a passive walker", inter_leg_angle, mass_offset)
-    return PassiveMap(walker, 1 if n_steps is None else n_steps)
+    return PassiveMap(walker)
 
 
 def _planar_parameters(parameters: WalkerParameters) -> WalkerParameters:

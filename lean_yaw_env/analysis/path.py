@@ -39,7 +39,9 @@ def distance_walked(displacements: ArrayLike, turn: ArrayLike = 0.0) -> NDArray[
 
 def rotated(places: Vector, turn: ArrayLike) -> Vector:
     """Places (..., n, 2) on the floor, downhill and to the right, after a turn (...) to the left about the origin."""
-    cosine, sine = (function(np.asarray(turn, dtype=float))[..., None] for function in (np.cos, np.sin))
+    cosine, sine = (
+        function(np.asarray(turn, dtype=float))[..., None] for function in (np.cos, np.sin)
+    )
     x, z = places[..., 0], places[..., 1]
     return np.stack([cosine * x + sine * z, cosine * z - sine * x], axis=-1)
 

@@ -11,16 +11,17 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import singledispatch
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lean_yaw_env.analysis.stride import require_offsets
 from lean_yaw_env.kernel.records import Command
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector, require_mass_offset
+from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.validation import require_choice
 from lean_yaw_env.walker import Walker
 
 if TYPE_CHECKING:
@@ -106,12 +107,19 @@ class Linearised(NamedTuple):
 class SectionMap(ABC):
     """A walker's map of the heel-strike section onto itself; states have ``k`` coordinates.
 
-    A subclass gives the walking step (``results``, ``step_many``, ``linear_step``) and says what its states are.
+    A subclass is a frozen dataclass. It gives the walking step (``results``, ``step_many``, ``linear_step``), says what its states are and where its gaits are looked for.
 
     Attributes
     ----------
+    walker : Walker or PassiveWalker
     n_steps : int
         How many steps the map takes.
+    names : tuple of str
+        Of the state's coordinates.
+    mirror : shape (k,)
+        Signs that turn a state into its mirror image on the other foot.
+    carried : float
+        What the first step finds of an earlier one beside the state; ``step_many`` hands it on.
     precision : float
         The largest change of a coordinate over the map that still counts as a fixed point.
     neutral_within : float
@@ -122,16 +130,15 @@ class SectionMap(ABC):
         Why the map has a multiplier of zero.
     """
 
+    walker: Walker | PassiveWalker
     n_steps: int
+    names: tuple[str, ...]
+    mirror: Vector
+    carried: float = 0.0
     precision: ClassVar[float] = RESIDUAL_LIMIT
     neutral_within: ClassVar[float] = 0.0
     parameters: ClassVar[tuple[str, ...]] = BODY_PARAMETERS
     zero_explanation: ClassVar[str] = ""
-
-    @property
-    @abstractmethod
-    def names(self) -> tuple[str, ...]:
-        """Names of the state's coordinates."""
 
     @property
     def motions(self) -> tuple[Motion, ...]:
@@ -144,14 +151,9 @@ class SectionMap(ABC):
         """Indices of the coordinates that a gait repeats."""
 
     @property
-    @abstractmethod
-    def mirror(self) -> Vector:
-        """Signs (k,) that turn a state into its mirror image on the other foot."""
-
-    @property
-    @abstractmethod
     def stander(self) -> Walker:
         """The walker whose stance phase a step of the map has."""
+        return Walker(self.walker.parameters)
 
     @abstractmethod
     def require_state(self, state: ArrayLike) -> Vector:
@@ -181,13 +183,10 @@ class SectionMap(ABC):
             As ``results``.
         """
 
-    @property
-    def carried(self) -> float:
-        """What the first step finds of an earlier one beside the state; ``step_many`` hands it on."""
-        return 0.0
-
     @abstractmethod
-    def step_many(self, states: Vector, carried: Vector, foot: int) -> tuple[Vector, Vector, Vector]:
+    def step_many(
+        self, states: Vector, carried: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
         """One step of n walkers on the left (0) or right (1) foot.
 
         Parameters
@@ -211,25 +210,31 @@ class SectionMap(ABC):
             If there is none; says what was tried.
         """
 
-    @abstractmethod
     def value(self, parameter: str) -> float:
         """A parameter's value, or ``ValueError`` for an unknown one."""
+        require_choice("parameter", parameter, self.parameters)
+        return getattr(self.walker.parameters, parameter)
 
-    @abstractmethod
     def moved(self, parameter: str, value: float) -> Self:
         """The same map at another value of a parameter."""
+        require_choice("parameter", parameter, self.parameters)
+        changed = replace(self.walker.parameters, **{parameter: value})
+        return self._with(walker=replace(self.walker, parameters=changed))
 
-    @abstractmethod
     def over(self, n_steps: int) -> Self:
         """The same walker's map over another number of steps."""
+        return self._with(n_steps=n_steps)
+
+    def _with(self, **changes: Any) -> Self:
+        return replace(self, **changes)  # pyright: ignore[reportArgumentType]  # every map is a dataclass
 
     def along(self, parameter: str) -> Self:
         """The map over as many steps as its gaits repeat in at every value of a parameter."""
         return self
 
-    @abstractmethod
     def question(self) -> dict[str, Any]:
         """What identifies the map in a stored result, as plain values."""
+        return {"map": type(self).__name__, "parameters": asdict(self.walker.parameters)}
 
     def image(self, state: Vector) -> Vector:
         """The state after ``n_steps``, mirrored if they are odd."""
@@ -276,19 +281,17 @@ def section_map_of(
     *,
     inter_leg_angle: float = INTER_LEG_ANGLE,
     mass_offset: float | tuple[float, float] = 0.0,
-    n_steps: int | None = None,
 ) -> SectionMap:
-    """A walker's section map, by default over the fewest steps that a simple gait repeats in.
+    """A walker's section map over the fewest steps that a simple gait repeats in.
 
     Parameters
     ----------
     walker : Walker, PassiveWalker or SectionMap
-        A map is returned as it is, over ``n_steps`` if they are given.
+        A map is returned as it is.
     inter_leg_angle : (0, pi/2)
         Of a ``Walker`` only.
     mass_offset : [-1, 1], or a pair of them (left foot's, right foot's)
         Of a ``Walker`` only.
-    n_steps : int >= 1, optional
 
     Raises
     ------
@@ -304,10 +307,25 @@ def _(
     *,
     inter_leg_angle: float = INTER_LEG_ANGLE,
     mass_offset: float | tuple[float, float] = 0.0,
-    n_steps: int | None = None,
 ) -> SectionMap:
     require_no_command("a map, which holds its own command,", inter_leg_angle, mass_offset)
-    return walker if n_steps is None else walker.over(n_steps)
+    return walker
+
+
+def require_offsets(mass_offset: float | tuple[float, float]) -> tuple[float, float]:
+    """Offsets in force while the left and while the right foot stands, or ``ValueError``."""
+    if isinstance(mass_offset, (tuple, list, np.ndarray)):
+        if len(mass_offset) != 2:
+            raise ValueError(
+                f"mass_offset must be a number or a pair (left foot's, right foot's), "
+                f"got {mass_offset!r}"
+            )
+        left, right = mass_offset
+        return require_mass_offset(left, "left mass_offset"), require_mass_offset(
+            right, "right mass_offset"
+        )
+    both = require_mass_offset(mass_offset)
+    return both, both
 
 
 def require_no_command(

@@ -51,15 +51,16 @@ def as_json(record: Any) -> str:
     return json.dumps(plain(record), indent=2, ensure_ascii=False, allow_nan=False)
 
 
-def gait_record(cycle: LimitCycle, names: Sequence[str]) -> Record:
-    """A limit cycle with its modes; ``names`` are the section state's coordinates."""
+def gait_record(cycle: LimitCycle) -> Record:
+    """A limit cycle with its modes."""
     return {
-        "state": dict(zip(names, cycle.state.tolist(), strict=True)),
+        "state": dict(zip(cycle.section_map.names, cycle.state.tolist(), strict=True)),
         "is_stable": cycle.is_stable,
         "speed": cycle.speed,
         "step_length": cycle.step_length,
         "stride_period": cycle.stride_period,
         "turn_per_stride": cycle.turn,
+        "turning_radius": cycle.turning_radius,
         "gravity_work_per_distance": cycle.gravity_work,
         "shift_work_per_distance": cycle.shift_work,
         "least_normal_force": cycle.least_normal_force,

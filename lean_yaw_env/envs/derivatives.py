@@ -5,6 +5,8 @@ without a difference of nearby numbers. The walking step's own come from ``kerne
 
 Inputs are what a step's result depends on: the walker's ``FOLLOWED`` fields before the step, the task's fields of which ``is_followed`` is
 set, then what is commanded (``COMMANDED``). Outputs are the followed fields after the step, the observation, the reward, the duration.
+
+``differentiate`` is a template, as ``judging.judge`` is.
 """
 
 from __future__ import annotations
@@ -145,16 +147,14 @@ def read_observation(column, walker, task, settings):
             continue
         value = sign * values[k] if ODD[k] else values[k]
         shown = (value - CENTRES[k]) / SCALES[k]
-        is_rate = k == PITCH_RATE or k == ANKLE_RATE
+        is_rate = k in (PITCH_RATE, ANKLE_RATE)
         hides = abs(shown.real) > OBSERVATION_LIMIT or (is_rate and settings.hidden_rates != 0)
         column[row] = 0.0 if hides else shown.imag / TINY
         row += 1
     return row
 
 
-def differentiate(
-    befores, tasks_before, walkers, tasks, settings, steps, jacobians, first, last
-):  # fmt: skip
+def differentiate(befores, tasks_before, walkers, tasks, settings, steps, jacobians, first, last):
     """Write the derivatives of the last step of walkers ``first`` to ``last`` - 1; of one that fell, zeros.
 
     Parameters

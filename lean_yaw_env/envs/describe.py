@@ -13,49 +13,35 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from lean_yaw_env.envs import columns as c
-from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.envs.tasks import Task, task_named
-from lean_yaw_env.envs.transition import (
-    BODY_DEVIATIONS,
-    HELD_OUT_REACH,
+from lean_yaw_env.envs.info import (
+    BODY_INFOS,
+    COMMON_INFOS,
+    FALL_INFO,
+    FOOTPRINT_MEANING,
+    HEADING_INFO,
+    PUSH_INFOS,
+    STATE_MEANING,
+)
+from lean_yaw_env.envs.observation import (
     OBSERVATION_LIMIT,
     OFFSET_SCALE,
-    START_DEVIATIONS,
     STATE_CENTRES,
     STATE_SCALES,
 )
+from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.envs.reset import BODY_DEVIATIONS, HELD_OUT_REACH, START_DEVIATIONS
+from lean_yaw_env.envs.tasks import Task, task_named
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, PARAMETER_NAMES, STATE_FIELDS
 from lean_yaw_env.registration import NAMESPACE, TASK_VERSIONS
 
 INFO_MEANINGS = {
-    "state": "section state (5,), not mirrored, after the push if there is one",
-    "footprint": "contact reference point of the stance foot (2,): downhill, right, from the start, in leg lengths",
-    "stance_side": "+1 while the left foot stands, -1 the right",
-    "mass_offset": "offset in force, leg lengths, positive to the right",
-    "inter_leg_angle": "commanded in the last step, rad",
-    "commanded_offset": "commanded in the last step",
-    "time": "since the start of the episode",
-    "steps": "since the start of the episode",
-    "distance": "sum of the steps' advances along the mean heading of their two footprints",
-    "duration": "of the last step",
-    "least_normal_force": "of the last step, in weights",
-    "greatest_friction": "of the last step, tangential over normal force",
-    "gravity_work": "of the last step, in weight times leg length",
-    "shift_work": "of the last step, put in by moving the masses",
-    "impact_loss": "of the last step",
-    "ankle_loss": "of the last step, into the ankle's spring and damper",
-    "speed": "advance of the last step over its duration",
-    "fall": "how the walker fell in the last step, or None",
+    "state": STATE_MEANING,
+    "footprint": FOOTPRINT_MEANING,
+    **{info.key: info.meaning for info in (*COMMON_INFOS, FALL_INFO)},
 }
+"""Of every task."""
 OPTIONAL_INFO_MEANINGS = {
-    "commanded_heading": "rad; of tasks that command one",
-    "pitch_push": "the last push on the pitch rate; with pushes",
-    "ankle_push": "the last push on the ankle rate; with pushes",
-    **{
-        name: "of this episode's body; with random bodies"
-        for name in PARAMETER_NAMES[: c.BODY_COLUMNS]
-    },
+    info.key: info.meaning for info in (HEADING_INFO, *PUSH_INFOS, *BODY_INFOS)
 }
 
 
@@ -148,7 +134,7 @@ def describe_task(task: Task) -> str:
         ("slope", slope),
         ("horizon", f"{task.horizon:g} units of time (truncation)"),
         ("ends", "; ".join(filter(None, ("a fall, a termination without reward", task.ends)))),
-        ("reward per unit of time", task.reward),
+        ("reward per unit of time", task.reward_text),
         ("largest change of offset per step", f"{task.max_offset_change:g}"),
         ("push level", f"{task.push_level:g}"),
         ("start", f"pumping by {task.pumping:g}" if task.pumping else "the gait on the slope"),
@@ -158,14 +144,14 @@ def describe_task(task: Task) -> str:
         facts.append((f"reset option `{name}`", f"{command.meaning}; {bounds}"))
     facts.append(("versions", "; ".join(task.history)))
     parts = [task.summary, table(("", ""), facts)]
-    if task.features:
+    if task.observed:
         parts.append("Observed after the common numbers:")
         parts.append(
             table(
                 ("name", "unit", "centre", "scale", "meaning"),
                 (
                     (f.name, f.unit, f"{f.centre:g}", f"{f.scale:g}", f.meaning)
-                    for f in task.features
+                    for f in task.observed
                 ),
             )
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,20 +11,59 @@ from gymnasium.utils import EzPickle
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from lean_yaw_env.envs.observation import OBSERVATION_LIMIT, STANCE_FOOT
 from lean_yaw_env.envs.simulation import Simulation
-from lean_yaw_env.envs.tasks.waypoint import RADIUS
+from lean_yaw_env.envs.tasks.waypoint import BEARING_SCALE, DISTANCE_SCALE, RADIUS
 from lean_yaw_env.envs.tasks.waypointgoal import TASK
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.envs.walker_env import WalkerEnv
-from lean_yaw_env.parameters import Vector
 
 GOAL_SCALE = 8.0
 """Leg lengths that a goal's unit stands for; a power of two, so that scaling rounds nothing."""
+GOAL_LIMIT = 1e6
+"""Bound of a goal's numbers, beyond any walk: what is observed is never cut to it."""
+
+_FOOT, _COSINE, _SINE, _SIZE = STANCE_FOOT, STANCE_FOOT + 1, STANCE_FOOT + 2, STANCE_FOOT + 3
 
 GoalObservation = dict[str, NDArray[Any]]
+Infos = Mapping[str, Any] | Sequence[Mapping[str, Any]] | NDArray[np.object_]
+"""What ``step`` told: of one walker, of many in one mapping of arrays, or of many one by one."""
 
 
-class WaypointGoalEnv(WalkerEnv):
+class GoalRules:
+    """What is paid and what ends an episode, from places and infos, as ``gymnasium_robotics.core.GoalEnv`` has it.
+
+    ``achieved_goal`` and ``desired_goal`` have the shape (..., 2). With those that ``step`` returned, and its ``info``, the results are what
+    ``step`` returned. ``info`` may be a mapping or a sequence of mappings; without the keys "fall" and "time" it tells of a walker that
+    neither fell nor came to the horizon. A step that ends in a fall reaches nothing.
+    """
+
+    simulation: Simulation
+
+    def compute_reward(
+        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Infos
+    ) -> NDArray[np.float64]:
+        """1 where the goal is reached, else 0; shape (...)."""
+        return (is_reached(achieved_goal, desired_goal) & ~_fell(info)).astype(np.float64)
+
+    def compute_terminated(
+        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Infos
+    ) -> NDArray[np.bool_]:
+        """Whether the goal is reached or the walker has fallen; shape (...)."""
+        return np.asarray(is_reached(achieved_goal, desired_goal) | _fell(info))
+
+    def compute_truncated(
+        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Infos
+    ) -> NDArray[np.bool_]:
+        """Whether the horizon, or the largest number of steps, cuts the episode; shape (...)."""
+        limits = self.simulation.settings[0]
+        is_late = (_told(info, "time") >= limits["horizon"]) | (
+            _told(info, "steps") >= limits["max_episode_steps"]
+        )
+        return np.asarray(is_late & ~self.compute_terminated(achieved_goal, desired_goal, info))
+
+
+class WaypointGoalEnv(GoalRules, WalkerEnv):
     """Waypoint with one goal an episode, in the dictionary layout of goal-conditioned learners such as SB3's ``HerReplayBuffer``.
 
     ## Observation space
@@ -32,13 +71,15 @@ class WaypointGoalEnv(WalkerEnv):
 
     | key | shape | numbers |
     |---|---|---|
-    | observation | (9,) float32 | the section state, the mass offset and the stance foot as in ``WalkerEnv`` with ``mirror=False``, then cosine and sine of the mean heading of the last two footprints |
-    | achieved_goal | (2,) float64 | where the walker is: (downhill at the start, right) / 8 leg lengths, unlimited |
+    | observation | (9,) float32 | the section state, the mass offset and the stance foot as in ``WalkerEnv``, then cosine and sine of the mean heading of the last two footprints |
+    | achieved_goal | (2,) float64 | where the walker is: (downhill at the start, right) / 8 leg lengths |
     | desired_goal | (2,) float64 | where it should be, alike |
+
+    ``seen_from_walker`` makes of it what ``WalkerEnv("WaypointGoal")`` observes.
 
     ## Rewards and ends
     1 for the step that comes within 0.5 leg lengths of the goal, which ends the episode as a termination; 0 for any other. A fall is a
-    termination too. The horizon is 150 units of time unless given.
+    termination too, and pays nothing wherever it happens. The horizon is 150 units of time unless given.
 
     ``info["is_success"]`` tells whether the goal is reached.
 
@@ -46,7 +87,8 @@ class WaypointGoalEnv(WalkerEnv):
     ----------
     render_mode : as ``WalkerEnv``
     **options
-        See ``EnvOptions``; ``mirror`` is always False, as places do not change sides with the stance foot.
+        See ``EnvOptions``. With ``mirror``, state, offset and actions of a right stance are mirrored; places, the heading and the stance
+        foot, which is always observed, are not.
 
     Raises
     ------
@@ -55,74 +97,42 @@ class WaypointGoalEnv(WalkerEnv):
     """
 
     def __init__(self, render_mode: str | None = None, **options: Any) -> None:
-        super().__init__(TASK, render_mode, **_unmirrored(options))
+        super().__init__(TASK, render_mode, **options)
         EzPickle.__init__(self, render_mode, **options)
-        self.observation_space = _goal_space(self.observation_space)
+        self.observation_space = _goal_space()
 
     def reset(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[GoalObservation, dict[str, Any]]:
         """As ``WalkerEnv.reset``."""
-        observation, info = super().reset(seed=seed, options=options)
-        return self._conditioned(observation), info
+        _, info = super().reset(seed=seed, options=options)
+        return self._conditioned(), info
 
     def step(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, action: ArrayLike
     ) -> tuple[GoalObservation, float, bool, bool, dict[str, Any]]:
         """Walk one step."""
-        observation, *rest = super().step(action)
-        return self._conditioned(observation), *rest  # pyright: ignore[reportReturnType]
+        _, *rest = super().step(action)
+        return self._conditioned(), *rest  # pyright: ignore[reportReturnType]
 
-    def compute_reward(
-        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any
-    ) -> NDArray[np.float64]:
-        """1 where the goal is reached, else 0.
-
-        Parameters
-        ----------
-        achieved_goal, desired_goal : shape (..., 2)
-        info : not looked at
-
-        Returns
-        -------
-        shape (...)
-        """
-        return is_reached(achieved_goal, desired_goal).astype(np.float64)
-
-    def compute_terminated(
-        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Mapping[str, Any]
-    ) -> NDArray[np.bool_]:
-        """Whether the episode ends there: the goal is reached, or the walker has fallen."""
-        return is_reached(achieved_goal, desired_goal) | (np.asarray(info["fall"]) != 0)
-
-    def compute_truncated(
-        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Mapping[str, Any]
-    ) -> bool:
-        """Whether the horizon of simulated time cuts the episode there."""
-        horizon = float(self.simulation.settings["horizon"][0])
-        ends = self.compute_terminated(achieved_goal, desired_goal, info)
-        return bool(info["time"] >= horizon and not ends)
-
-    def _conditioned(self, observation: NDArray[np.float32]) -> GoalObservation:
-        goals = {key: goal[0] for key, goal in _goals(self.simulation).items()}
-        return {"observation": observation, **goals}
+    def _conditioned(self) -> GoalObservation:
+        return {key: value[0] for key, value in _conditioned(self.simulation).items()}
 
 
-class WaypointGoalVectorEnv(WalkerVectorEnv):
+class WaypointGoalVectorEnv(GoalRules, WalkerVectorEnv):
     """``num_envs`` walkers, bit for bit as so many ``WaypointGoalEnv`` seeded ``seed + i``; parameters as ``WalkerVectorEnv``."""
 
     def __init__(self, num_envs: int = 1, **arguments: Any) -> None:
-        super().__init__(num_envs, TASK, **_unmirrored(arguments))
+        super().__init__(num_envs, TASK, **arguments)
         EzPickle.__init__(self, num_envs, **arguments)
-        self.single_observation_space = _goal_space(self.single_observation_space)
+        self.single_observation_space = _goal_space()
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
     def _observations(self) -> Any:
-        return {"observation": super()._observations(), **_goals(self.simulation)}
+        return _conditioned(self.simulation)
 
     def _observation(self, row: int) -> Any:
-        goals = {key: goal[row] for key, goal in _goals(self.simulation).items()}
-        return {"observation": super()._observation(row), **goals}
+        return {key: value[row] for key, value in _conditioned(self.simulation).items()}
 
 
 def is_reached(achieved_goal: ArrayLike, desired_goal: ArrayLike) -> NDArray[np.bool_]:
@@ -132,27 +142,65 @@ def is_reached(achieved_goal: ArrayLike, desired_goal: ArrayLike) -> NDArray[np.
     return np.asarray(np.sqrt(square) <= RADIUS / GOAL_SCALE)
 
 
-def _goals(simulation: Simulation) -> dict[str, Vector]:
-    """Where walkers are and should be, each (n, 2)."""
+def seen_from_walker(goal_observation: Mapping[str, Any], *, mirror: bool, xp: Any = np) -> Any:
+    """What ``WalkerEnv("WaypointGoal")`` observes: the goal as bearing and distance from the walker, whichever goal it is.
+
+    Parameters
+    ----------
+    goal_observation : arrays (..., 9), (..., 2) and (..., 2)
+        Of ``WaypointGoalEnv``, made with the same ``mirror``; the goal may be another one than the environment's.
+    mirror : bool
+    xp : numpy, or torch if the arrays are tensors
+
+    Returns
+    -------
+    shape (..., 8), or (..., 9) without ``mirror``, which shows the stance foot
+    """
+    own = goal_observation["observation"]
+    apart = GOAL_SCALE * (goal_observation["desired_goal"] - goal_observation["achieved_goal"])
+    downhill, right = apart[..., :1], apart[..., 1:]
+    cosine, sine = own[..., _COSINE : _COSINE + 1], own[..., _SINE : _SINE + 1]
+    ahead = downhill * cosine - right * sine
+    left = -downhill * sine - right * cosine
+    bearing = xp.arctan2(left, ahead)
+    if mirror:
+        bearing = own[..., _FOOT : _FOOT + 1] * bearing
+    distance = xp.hypot(downhill, right)
+    numbers = [
+        own[..., : _FOOT if mirror else _FOOT + 1],
+        bearing / BEARING_SCALE,
+        xp.clip(distance / DISTANCE_SCALE, 0.0, OBSERVATION_LIMIT),
+    ]
+    return xp.concatenate([each.astype(np.float32) if xp is np else each for each in numbers], -1)
+
+
+def _conditioned(simulation: Simulation) -> GoalObservation:
+    """The observations of all walkers: (n, 9), (n, 2) and (n, 2)."""
     tasks = simulation.tasks
+    own = np.empty((simulation.n, _SIZE), dtype=np.float32)
+    own[:, :_FOOT] = simulation.observations[:, :_FOOT]
+    own[:, _FOOT] = simulation.walkers["side"]
+    own[:, _COSINE] = tasks["heading_cosine"]
+    own[:, _SINE] = tasks["heading_sine"]
     return {
-        "achieved_goal": _scaled(tasks["own_x"], tasks["own_z"]),
-        "desired_goal": _scaled(tasks["goal_x"], tasks["goal_z"]),
+        "observation": own,
+        "achieved_goal": np.stack([tasks["own_x"], tasks["own_z"]], axis=1) / GOAL_SCALE,
+        "desired_goal": np.stack([tasks["goal_x"], tasks["goal_z"]], axis=1) / GOAL_SCALE,
     }
 
 
-def _scaled(downhill: Vector, right: Vector) -> Vector:
-    return np.stack([downhill, right], axis=1) / GOAL_SCALE
+def _goal_space() -> Any:
+    own = spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (_SIZE,), np.float32)
+    goal = spaces.Box(-GOAL_LIMIT, GOAL_LIMIT, (2,), np.float64)
+    return spaces.Dict({"observation": own, "achieved_goal": goal, "desired_goal": goal})
 
 
-def _goal_space(observation: Any) -> Any:
-    goal = spaces.Box(-np.inf, np.inf, (2,), np.float64)
-    return spaces.Dict(
-        {"observation": observation, "achieved_goal": goal, "desired_goal": goal}
-    )
+def _fell(info: Infos) -> NDArray[np.bool_]:
+    return _told(info, "fall") != 0
 
 
-def _unmirrored(options: Mapping[str, Any]) -> dict[str, Any]:
-    if options.get("mirror"):
-        raise ValueError(f"mirror must be False with goals in space, got {options['mirror']!r}")
-    return {**options, "mirror": False}
+def _told(info: Infos, key: str) -> NDArray[Any]:
+    """A number of each info; 0 where it is not told."""
+    if isinstance(info, Mapping):
+        return np.asarray(info.get(key, 0))
+    return np.array([each.get(key, 0) for each in info])

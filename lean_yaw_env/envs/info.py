@@ -38,10 +38,12 @@ class FallCode(IntEnum):
     """No fall: the integrator gave the step up, and the episode ends where the step began."""
 
     @property
-    def description(self) -> str:
-        """The fall's name as ``lean_yaw_env.Fall`` has it, "solver", or "none"."""
+    def word(self) -> str | None:
+        """The fall's name as ``lean_yaw_env.Fall`` has it, "solver", or None for no fall."""
+        if self is FallCode.SOLVER:
+            return "solver"
         fall = FALL_OF_STATUS.get(float(self) + records.STEPPED)
-        return self.name.lower() if fall is None else fall.value
+        return None if fall is None else fall.value
 
 
 class Info(NamedTuple):
@@ -53,9 +55,7 @@ class Info(NamedTuple):
 
 
 STATE_MEANING = "section state (5,), not mirrored, after the push if there is one"
-FOOTPRINT_MEANING = (
-    "contact reference point of the stance foot (2,): downhill, right, from the start, in leg lengths"
-)
+FOOTPRINT_MEANING = "contact reference point of the stance foot (2,): downhill, right, from the start, in leg lengths"
 _ARRAYS = (*(f"walker.{field.name}" for field in STATE_FIELDS), "walker.place_x", "walker.place_z")
 _FOOTPRINT = slice(STATE_SIZE, STATE_SIZE + 2)
 _FIRST_NUMBER = STATE_SIZE + 2
@@ -94,7 +94,7 @@ FALL_INFO = Info(
     "fall",
     "walker.fall",
     "how the last step ended, as an integer: "
-    + ", ".join(f"{code.value} {code.description}" for code in FallCode),
+    + ", ".join(f"{code.value} {code.word or 'none'}" for code in FallCode),
 )
 PUSH_INFOS = tuple(
     Info(f"{name}_push", f"walker.{name}_push", f"the last push on the {name} rate; with pushes")
@@ -121,14 +121,14 @@ def _metric(key: str, metric: Any) -> Info:
 
 
 def infos_of(task: Any) -> tuple[Info, ...]:
-    """The numbers that a task tells beside state, footprint and fall; the last six on some conditions."""
+    """The numbers that a task tells beside state, footprint and fall: those of pushes first, those of bodies last."""
     heading = () if task.heading_field is None else (task.heading_field,)
     common = {info.key for info in COMMON_INFOS}
     return (
+        *PUSH_INFOS,
         *COMMON_INFOS,
         *(_metric(key, metric) for key, metric in task.metrics.items() if key not in common),
         *(HEADING_INFO._replace(source=_read(name)) for name in heading),
-        *PUSH_INFOS,
         *BODY_INFOS,
     )
 
@@ -157,16 +157,11 @@ class InfoMaker:
 
     def __init__(self, task: Any, *, has_pushes: bool, has_bodies: bool) -> None:
         self.size = info_size(task)
-        hidden = set() if has_pushes else {info.key for info in PUSH_INFOS}
-        hidden |= set() if has_bodies else {info.key for info in BODY_INFOS}
         infos = infos_of(task)
-        told = [k for k, info in enumerate(infos) if info.key not in hidden]
-        # what is hidden comes last as a rule, and a slice is quicker than a choice
-        is_first = told == list(range(len(told)))
-        self._columns: Any = [_FIRST_NUMBER + k for k in told]
-        if is_first:
-            self._columns = slice(_FIRST_NUMBER, _FIRST_NUMBER + len(told))
-        self._names = tuple(infos[k].key for k in told)
+        first = 0 if has_pushes else len(PUSH_INFOS)
+        last = len(infos) - (0 if has_bodies else len(BODY_INFOS))
+        self._columns = slice(_FIRST_NUMBER + first, _FIRST_NUMBER + last)
+        self._names = tuple(info.key for info in infos[first:last])
         self._masks = tuple(f"_{key}" for key in (*self._names, "state", "footprint", "fall"))
 
     def views(self, row: Vector) -> tuple[Vector, Vector, Vector]:
@@ -182,9 +177,7 @@ class InfoMaker:
         info["fall"] = fall
         return info
 
-    def many(
-        self, table: Vector, falls: NDArray[np.int64], mask: Flags
-    ) -> dict[str, Any]:
+    def many(self, table: Vector, falls: NDArray[np.int64], mask: Flags) -> dict[str, Any]:
         """The infos of a vector environment, views of its table (n, size), each key beside its mask."""
         info: dict[str, Any] = dict.fromkeys(self._masks, mask)
         info.update(zip(self._names, table.T[self._columns], strict=False))

@@ -19,7 +19,7 @@ from lean_yaw_env.envs.reset import BODY_DEVIATIONS, HELD_OUT_REACH, BodyDraw
 from lean_yaw_env.envs.state import BODY_NAMES, SETTINGS, Records
 from lean_yaw_env.envs.tasks import Task
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, QUARTER_TURN, WalkerParameters
-from lean_yaw_env.validation import require_choice, require_flag, require_number, suggestion
+from lean_yaw_env.validation import require_flag, require_number, suggestion
 from lean_yaw_env.walker import Walker
 
 RandomBody = Literal["training", "held-out"]
@@ -103,7 +103,7 @@ class EnvOptions:
         for name in ("mirror", "action_delay", "hidden_rates"):
             require_flag(name, getattr(self, name))
         if self.random_body is not None:
-            require_choice("random_body", self.random_body, ("training", "held-out"))
+            _require_random_body(self.random_body)
 
     @classmethod
     def of(cls, arguments: Mapping[str, Any]) -> EnvOptions:
@@ -182,12 +182,12 @@ def settings_of(
     record["hidden_heading"] = own.parameters.slope_turns
     record["pitch_push"] = own.push_level * PITCH_PUSH
     record["ankle_push"] = own.push_level * ANKLE_PUSH
-    record["gait"] = gait_of(own.parameters, task.pumping)
-    record["gait_offset"] = 0.0 - task.pumping
     record["random_body"] = _BODY_DRAWS[options.random_body]
     if options.random_body is not None:
         record["body_centre"] = _require_body_box(own.parameters)
         record["body_reach"] = BODY_DEVIATIONS
+    record["gait"] = gait_of(own.parameters, task.pumping)
+    record["gait_offset"] = 0.0 - task.pumping
     return record
 
 
@@ -229,6 +229,14 @@ _OPTIONAL_RANGES = (
     ("friction_limit", 0.0, math.inf, "(]"),
     ("push_level", 0.0, 10.0, "[]"),
 )
+
+
+def _require_random_body(value: Any) -> None:
+    kinds = [kind for kind in _BODY_DRAWS if kind is not None]
+    if not isinstance(value, str) or value not in kinds:
+        raise ValueError(
+            f"random_body must be None or one of {', '.join(kinds)}, got {value!r}{suggestion(value, kinds)}"
+        )
 
 
 def _given(value: float | None, default: float) -> float:

@@ -1,4 +1,4 @@
-"""What an environment's pictures need: the walk so far, kept only by environments that draw."""
+"""What an environment's pictures need: the walks so far, kept only by environments that draw."""
 
 from __future__ import annotations
 
@@ -6,12 +6,19 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lean_yaw_env.envs.formulas import mean_heading
+from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.parameters import Foot, Vector
 from lean_yaw_env.rendering.geometry import Pose, walker_shape
+from lean_yaw_env.rendering.pygame_renderer import LEAST_SIZE, Renderer
 from lean_yaw_env.rendering.scene import Goal, Scene, status_lines
+
+RENDER_FPS = 4
+"""Walking steps per second of a video: near a walker of a metre's leg at Table 1's gait."""
+MOST_PICTURES = 64
 
 
 class Footage:
@@ -61,7 +68,9 @@ class Footage:
             path=np.array(self._path),
             commanded_heading=self._goal_direction() if command is None else command,
             goals=self._goals(),
-            reference_path=None if kind.reference_path is None else kind.reference_path(walker, task),
+            reference_path=None
+            if kind.reference_path is None
+            else kind.reference_path(walker, task),
             lines=status_lines(
                 step=int(walker.steps),
                 time=time,
@@ -93,4 +102,46 @@ class Footage:
             inter_leg_angle=float(walker.inter_leg_angle),
             mass_offset=float(walker.mass_offset),
             contact=np.array([walker.place_x, walker.place_z]),
+        )
+
+
+class Gallery:
+    """A picture of each of a simulation's walkers, small enough to stand side by side.
+
+    Raises
+    ------
+    ValueError
+        If there are more than ``MOST_PICTURES`` walkers.
+    gymnasium.error.DependencyNotInstalled
+        If pygame is not installed.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        if simulation.n > MOST_PICTURES:
+            raise ValueError(
+                f"render_mode draws at most {MOST_PICTURES} walkers, got num_envs={simulation.n}"
+            )
+        self._simulation = simulation
+        self._renderer = Renderer(LEAST_SIZE)
+        self._walks: list[Footage | None] = [None] * simulation.n
+
+    def restart(self, mask: NDArray[np.bool_]) -> None:
+        """Forget the walks of these walkers, whose episodes have just begun."""
+        for row in np.flatnonzero(mask).tolist():
+            self._walks[row] = Footage(self._simulation, row)
+
+    def extend(self, mask: NDArray[np.bool_]) -> None:
+        """Take in the step that these walkers have just made."""
+        for row in np.flatnonzero(mask).tolist():
+            walk = self._walks[row]
+            if walk is not None:
+                walk.extend()
+
+    def frames(self) -> tuple[NDArray[np.uint8], ...]:
+        """A picture of each walker, (height, width, 3)."""
+        falls = self._simulation.falls.tolist()
+        return tuple(
+            self._renderer.frame(walk.scene(FallCode(fall).word))
+            for walk, fall in zip(self._walks, falls, strict=True)
+            if walk is not None
         )

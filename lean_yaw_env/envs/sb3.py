@@ -11,9 +11,14 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
+from lean_yaw_env.envs.goal_env import WaypointGoalVectorEnv
 from lean_yaw_env.envs.snapshots import from_plain, plain
 from lean_yaw_env.envs.tasks import Task
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
+from lean_yaw_env.registration import GOAL_ENV_ID
+
+Observations = Any
+"""An array (num_envs, features); of goal-conditioned walkers a dictionary of such arrays."""
 
 _TRUNCATED = "TimeLimit.truncated"
 
@@ -30,10 +35,11 @@ class WalkerVecEnv(VecEnv):
     ----------
     num_envs : int >= 1
     task : str or Task
-        A task's name, its environment id, or a task of your own.
+        A task's name, its environment id, or a task of your own. Observations are dictionaries for the id ``LeanYaw/WaypointGoal-v0`` only.
     step_info : bool
         Fill every walker's info at every step, which costs far more than the step itself.
     threads : int >= 1
+    render_mode : None or "rgb_array"
     **options
         See ``EnvOptions``.
 
@@ -50,17 +56,21 @@ class WalkerVecEnv(VecEnv):
         *,
         step_info: bool = False,
         threads: int = 1,
+        render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        self.walkers = WalkerVectorEnv(
-            num_envs,
-            task,
-            autoreset_mode=AutoresetMode.SAME_STEP,
-            step_info=step_info,
-            threads=threads,
+        arguments: dict[str, Any] = {
+            "autoreset_mode": AutoresetMode.SAME_STEP,
+            "step_info": step_info,
+            "threads": threads,
+            "render_mode": render_mode,
             **options,
-        )
-        self.walkers._tells_ends = True
+        }
+        if task == GOAL_ENV_ID:
+            self.walkers = WaypointGoalVectorEnv(num_envs, **arguments)
+        else:
+            self.walkers = WalkerVectorEnv(num_envs, task, **arguments)
+        self.walkers._tells_episodes = True
         space = self.walkers.single_observation_space
         super().__init__(num_envs, space, self.walkers.single_action_space)
         self._step_info = step_info
@@ -70,8 +80,8 @@ class WalkerVecEnv(VecEnv):
         self.episode_returns = np.zeros(num_envs)
         self.episode_lengths = np.zeros(num_envs, dtype=np.int64)
 
-    def reset(self) -> NDArray[np.float32]:
-        """Begin episodes of all walkers, with the seeds and options set since the last call; shape (num_envs, features)."""
+    def reset(self) -> Observations:
+        """Begin episodes of all walkers, with the seeds and options set since the last call."""
         seeds = None if all(seed is None for seed in self._seeds) else self._seeds
         first = self._options[0]
         if all(options == first for options in self._options):
@@ -91,7 +101,7 @@ class WalkerVecEnv(VecEnv):
 
     def step_wait(
         self,
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+    ) -> tuple[Observations, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Walk one step each; walkers whose episode ends show the first observation of the next."""
         if self._actions is None:
             raise RuntimeError("call step_async() before step_wait()")
@@ -134,8 +144,8 @@ class WalkerVecEnv(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
-        """Many walkers draw no pictures."""
-        return [None for _ in range(self.num_envs)]
+        """A picture of each walker, if the environment is made with ``render_mode="rgb_array"``; SB3 puts them side by side."""
+        return self.walkers.render() or [None for _ in range(self.num_envs)]
 
     def step_durations(self) -> NDArray[np.float64]:
         """How long each walker's last step took in simulated time, shape (num_envs,); 0 where it ended an episode."""
@@ -168,7 +178,7 @@ class WalkerVecEnv(VecEnv):
         for name, own in sums.items():
             own[:] = snapshot[name]
 
-    def _reset_each(self, seeds: list[int | None] | None) -> NDArray[np.float32]:
+    def _reset_each(self, seeds: list[int | None] | None) -> Observations:
         """Reset walkers that have options of their own, one after the other."""
         for i, options in enumerate(self._options):
             mask = np.zeros(self.num_envs, dtype=np.bool_)
@@ -201,7 +211,4 @@ class WalkerVecEnv(VecEnv):
 
 def _of_walker(info: dict[str, Any], i: int) -> dict[str, Any]:
     """One walker's share of a vector environment's info, as a single environment gives it."""
-    return {
-        key: value[i] for key, value in info.items() if not key.startswith(("_", "final_"))
-    }
-
+    return {key: value[i] for key, value in info.items() if not key.startswith(("_", "final_"))}

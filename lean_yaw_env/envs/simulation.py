@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lean_yaw_env.envs.dynamics import command_many, walk_many, walk_one
-from lean_yaw_env.envs.info import InfoMaker
+from lean_yaw_env.envs.info import FallCode, InfoMaker
 from lean_yaw_env.envs.judging import What
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, settings_of
 from lean_yaw_env.envs.reset import start_episodes
@@ -23,15 +23,16 @@ from lean_yaw_env.envs.state import (
     mirror,
     states_of,
 )
-from lean_yaw_env.envs.tasks import Task
+from lean_yaw_env.envs.tasks import Command, Task
 from lean_yaw_env.kernel.compilation import for_types_of
 from lean_yaw_env.parameters import Vector, WalkerParameters, require_foot, require_state
-from lean_yaw_env.validation import require_array, suggestion
+from lean_yaw_env.validation import require_array, require_number, suggestion
 from lean_yaw_env.walker import SIDE
 
 RESET_OPTIONS = ("state", "stance")
 """Of every task; some have commands besides."""
 _KEYS = 2**64
+_SOLVER = int(FallCode.SOLVER)
 _STEP, _START, _PLACE, _REPORT = (int(each) for each in What)
 Flags = NDArray[np.bool_]
 
@@ -52,6 +53,7 @@ class Simulation:
     walkers : records (n,), see ``state.WALKER_FIELDS``
     tasks : records (n,), see ``Task.fields``
     falls : shape (n,), a view of the walkers' field ``fall``
+    solver_failures : how many episodes have ended because the integrator gave a step up, as ``note_failures`` counts them
     settings : record (1,), see ``state.SETTINGS_FIELDS``
     bodies : shape (n or 1, 11)
         The walkers' constants as the kernels take them; one row for all unless bodies are random.
@@ -79,6 +81,7 @@ class Simulation:
         self.ends = np.zeros((2, n), dtype=np.bool_)
         has_pushes = bool((self.settings["pitch_push"] > 0.0) | (self.settings["ankle_push"] > 0.0))
         self.info = InfoMaker(task, has_pushes=has_pushes, has_bodies=one_each)
+        self.solver_failures = 0
         self._no_infos = np.zeros((0, self.info.size))
         self._nobody = np.zeros(n, dtype=np.bool_)
         self.falls: NDArray[np.int64] = self.walkers["fall"]
@@ -112,6 +115,10 @@ class Simulation:
         """Fresh arrays for the next step's rewards and ends: those there are belong to whom they were returned to."""
         self.rewards = np.zeros(self.n)
         self.ends = np.zeros((2, self.n), dtype=np.bool_)
+
+    def note_failures(self) -> None:
+        """Count the solver's failures among the steps just made."""
+        self.solver_failures += int(np.count_nonzero(self.falls[self.terminated] == _SOLVER))
 
     def start(
         self, mask: Flags, generators: list[np.random.Generator], infos: Vector | None = None
@@ -155,6 +162,13 @@ class Simulation:
         """Put what ``actions`` command into the records (``inter_leg_angle``, ``commanded_offset``), without a step."""
         command_many(self.walkers, self.settings, self.actions)
 
+    def take_over(self, other: Simulation, rows: NDArray[np.int64]) -> None:
+        """Put walkers of another simulation of this task, those of ``rows`` (n,), in the place of these; ``observe`` shows them."""
+        self.walkers[:] = other.walkers[rows]
+        self.tasks[:] = other.tasks[rows]
+        if len(self.bodies) > 1:
+            self.bodies[:] = other.bodies[rows]
+
     def check_options(self, options: dict[str, Any]) -> dict[str, Any]:
         """Reset options as numbers, or ``ValueError``."""
         checked: dict[str, Any] = {}
@@ -170,10 +184,7 @@ class Simulation:
             checked["state"] = require_state(options["state"])
         for name, command in self.task.commands.items():
             if name in options:
-                given = np.atleast_1d(options[name])
-                checked[name] = require_array(
-                    name, given, (len(command.fields),), command.low, command.high, "[]"
-                ).tolist()
+                checked[name] = _require_command(name, options[name], command)
         return checked
 
     def step_one(self, infos: Vector) -> bool:
@@ -221,6 +232,13 @@ class Simulation:
             what, self.walkers, self.tasks, self.settings, self.observations, self.rewards,
             self.ends, told, skip, first, last,
         )  # fmt: skip
+
+
+def _require_command(name: str, value: Any, command: Command) -> list[float]:
+    size, low, high = len(command.fields), command.low, command.high
+    if size == 1:
+        return [require_number(name, value, low, high)]
+    return require_array(name, value, (size,), low, high, "[]").tolist()
 
 
 def _words(records: Records) -> NDArray[np.uint64]:

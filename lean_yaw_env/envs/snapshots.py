@@ -13,7 +13,7 @@ from lean_yaw_env.envs.state import Records
 State = dict[str, NDArray[Any]]
 """Arrays by name; ``walkers`` and ``tasks`` are records with named fields."""
 
-_ARRAYS = ("walkers", "tasks", "bodies", "observations", "rewards", "ends")
+_ARRAYS = ("walkers", "tasks", "bodies", "observations")
 _WORDS = 6  # of 64 bits, that a PCG64 generator's state takes
 _WORD = 2**64
 

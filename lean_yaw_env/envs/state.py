@@ -65,7 +65,9 @@ WALKER_FIELDS = (
     Field("time", "time units", "since the start of the episode"),
     Field("steps", "", "since the start of the episode", "i8"),
     Field("distance", "leg lengths", "sum of the advances"),
-    Field("work", "weight times leg length", "sum of the steps' positive work of moving the masses"),
+    Field(
+        "work", "weight times leg length", "sum of the steps' positive work of moving the masses"
+    ),
     # --- the last step
     Field("inter_leg_angle", "rad", "commanded"),
     Field("commanded_offset", "leg lengths", "commanded mass offset", is_odd=True),

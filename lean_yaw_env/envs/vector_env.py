@@ -14,13 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.envs.info import InfoPages
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, action_space
+from lean_yaw_env.envs.pictures import RENDER_FPS, Gallery
 from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.envs.snapshots import State, restore, state_of
 from lean_yaw_env.envs.tasks import Task, task_named
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.threads import share_out
-from lean_yaw_env.validation import require_count
+from lean_yaw_env.validation import require_choice, require_count
 
+_RENDER_MODES = ("rgb_array",)
 Observations = NDArray[np.float32]
 
 
@@ -44,6 +46,8 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         Threads that share the walkers of a step; worth it from some thousands of walkers on.
     max_episode_steps : int >= 1, optional
         Steps after which an episode is truncated, besides the horizon of simulated time.
+    render_mode : None or "rgb_array"
+        Pictures of at most ``pictures.MOST_PICTURES`` walkers; they need pygame.
     **options
         See ``EnvOptions``.
 
@@ -65,7 +69,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         step_info: bool = True,
         threads: int = 1,
         max_episode_steps: int | None = None,
-        render_mode: None = None,
+        render_mode: str | None = None,
         **options: Any,
     ) -> None:
         EzPickle.__init__(
@@ -77,10 +81,14 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         if max_episode_steps is not None:
             require_count("max_episode_steps", max_episode_steps)
         if render_mode is not None:
-            raise ValueError(f"render_mode must be None for many walkers, got {render_mode!r}")
+            require_choice("render_mode", render_mode, _RENDER_MODES)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {"autoreset_mode": self.autoreset_mode}
-        self.render_mode = None
+        self.metadata = {
+            "autoreset_mode": self.autoreset_mode,
+            "render_modes": list(_RENDER_MODES),
+            "render_fps": RENDER_FPS,
+        }
+        self.render_mode = render_mode
         self.copy = copy
         self.step_info = step_info
         self.options = EnvOptions.of(options)
@@ -94,7 +102,8 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._generators: list[np.random.Generator] | None = None
         self._ended = np.ones(self.num_envs, dtype=np.bool_)
-        self._tells_ends = step_info
+        self._tells_episodes = step_info
+        self._gallery = None if render_mode is None else Gallery(self.simulation)
         self._pages = InfoPages(self.simulation.info, self.num_envs)
 
     def reset(
@@ -112,10 +121,12 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         mask = self._reset_mask(placement.pop("reset_mask", None))
         self.simulation.check_options(placement)
         self._seed(seed, mask)
-        infos = self.simulation.new_infos(cleared=True) if self.step_info else None
+        infos = self.simulation.new_infos(cleared=True) if self._tells_episodes else None
         self._begin(mask, infos)
         if placement:
             self.simulation.place(mask, placement, infos)
+            if self._gallery is not None:
+                self._gallery.restart(mask)
         return self._observations(), self._told(infos, mask)
 
     def step(
@@ -139,15 +150,29 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
             self.num_envs,
             self.threads,
         )
+        if self._gallery is not None:
+            self._gallery.extend(~self._ended)
         if restarts:
             self._begin(self._ended.copy(), infos)
         rewards, (terminated, truncated) = simulation.rewards, simulation.ends
         np.logical_or(terminated, truncated, out=self._ended)
+        ends = np.count_nonzero(self._ended) > 0
+        if ends:
+            simulation.note_failures()
         final: dict[str, Any] = {}
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and np.count_nonzero(self._ended):
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and ends:
             final = self._restart_in_same_step(infos)
         info = {} if page is None else page.info(simulation.falls)
         return self._observations(), rewards, terminated, truncated, final | info
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """A picture of each walker just after its last heel strike, (height, width, 3), as ``SyncVectorEnv`` gives them; recorders put them side by side."""
+        if self._gallery is None:
+            gym.logger.warn("render() draws nothing: make the environment with a render_mode")
+            return None
+        if self._generators is None:
+            raise gym.error.ResetNeeded("call reset() before render()")
+        return self._gallery.frames()
 
     def get_state(self) -> State:
         """Copies of all that the next step depends on, random streams included, as arrays by name; see ``WalkerEnv.get_state``."""
@@ -168,6 +193,8 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
             raise ValueError(f"state must hold 'ended', bool, in shape ({self.num_envs},)")
         self._generators = restore(self.simulation, state)
         self._ended[:] = ended
+        if self._gallery is not None:
+            self._gallery.restart(np.ones(self.num_envs, dtype=np.bool_))
 
     def __getstate__(self) -> dict[str, Any]:
         """The arguments, and the state of episodes under way."""
@@ -198,14 +225,15 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         """Keep what the ended episodes ended with, then begin new ones."""
         mask = self._ended.copy()
         observations = np.full(self.num_envs, None, dtype=object)
-        for i in np.flatnonzero(mask):
+        for i in np.flatnonzero(mask).tolist():
             observations[i] = self._observation(i)
         final = {"final_obs": observations, "_final_obs": mask}
-        if self._tells_ends:
+        if self._tells_episodes:
             told = self._told(self.simulation.report(mask), mask)
             final |= {"final_info": told, "_final_info": mask}
         self._begin(mask, infos)
         return final
+
     def _reset_mask(self, mask: Any) -> NDArray[np.bool_]:
         if mask is None:
             return np.ones(self.num_envs, dtype=np.bool_)
@@ -244,6 +272,8 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         assert self._generators is not None
         self.simulation.start(mask, self._generators, infos)
         self._ended[mask] = False
+        if self._gallery is not None:
+            self._gallery.restart(mask)
 
     def _observations(self) -> Observations:
         observations = self.simulation.observations

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import combinations
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -12,15 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, action_space
-from lean_yaw_env.envs.pictures import Footage
+from lean_yaw_env.envs.pictures import RENDER_FPS, Footage
 from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.envs.snapshots import State, restore, state_of
 from lean_yaw_env.envs.tasks import Task, task_named
 from lean_yaw_env.rendering.pygame_renderer import Renderer
 from lean_yaw_env.validation import require_choice
 
-RENDER_FPS = 4
-"""Walking steps per second of a video: near a walker of a metre's leg at Table 1's gait."""
+_KEYS = {"w": (-1.0, 0.0), "s": (1.0, 0.0), "a": (0.0, -1.0), "d": (0.0, 1.0)}
+"""What each key adds to the action: short steps are fast ones, and the walker turns to the side of its masses."""
 _ONE = np.ones(1, dtype=np.bool_)
 
 
@@ -127,6 +129,8 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         if not simulation.step_one(self._infos):
             raise ValueError(f"action must be numbers in [-1, 1], got {chosen.tolist()}")
         (terminated,), (truncated,) = simulation.ends.tolist()
+        if terminated:
+            simulation.note_failures()
         self._running = not (terminated or truncated)
         if self._footage is not None:
             self._footage.extend()
@@ -146,7 +150,9 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         (``envs.state.WALKER_FIELDS``, ``Task.fields``).
         """
         if not self._running:
-            raise ResetNeeded("call reset() before get_state(): the episode is over or has not begun")
+            raise ResetNeeded(
+                "call reset() before get_state(): the episode is over or has not begun"
+            )
         return state_of(self.simulation, [self.np_random])
 
     def set_state(self, state: State) -> None:
@@ -183,6 +189,19 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
             return None
         return self._renderer.frame(self._footage.scene(self._fall()))
 
+    def get_keys_to_action(self) -> dict[str, NDArray[np.float32]]:
+        """Actions of keys held together, for ``gymnasium.utils.play``: "a" and "d" steer left and right, "w" and "s" walk faster and slower.
+
+        Raises
+        ------
+        ValueError
+            If the environment is mirrored: its actions change sides with the stance foot, and keys cannot.
+        """
+        if self.options.mirror:
+            raise ValueError("mirror must be False for keys that steer left and right, got True")
+        held = [keys for n in range(len(_KEYS) + 1) for keys in combinations(_KEYS, n)]
+        return {"".join(keys): _action_of(keys) for keys in held}
+
     def close(self) -> None:
         """Close the window, if there is one."""
         if self._renderer is not None:
@@ -201,5 +220,11 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
             self._renderer.show(self._footage.scene(self._fall()), RENDER_FPS)
 
     def _fall(self) -> str | None:
-        code = FallCode(self.simulation.falls[0])
-        return code.description if code else None
+        return FallCode(self.simulation.falls[0]).word
+
+
+def _action_of(keys: Iterable[str]) -> NDArray[np.float32]:
+    action = np.zeros(ACTION_SIZE, dtype=np.float32)
+    for key in keys:
+        action += np.array(_KEYS[key], dtype=np.float32)
+    return action

@@ -9,18 +9,21 @@ Both keep IEEE semantics (no fast-math), so that every kernel that inlines the s
 from __future__ import annotations
 
 import hashlib
+import linecache
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
+import numpy as np
 from numba import config, njit, typeof
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
 from lean_yaw_env.kernel import fusing
+from lean_yaw_env.kernel.notice import NOTICE
 
 # A division by zero gives inf or nan as in C: Python's exception would be a branch, and a branch stops vectorisation.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy"}
@@ -50,19 +53,31 @@ def formula(function: Any) -> Any:
 def written_formula(name: str, arguments: Sequence[str], lines: Sequence[str]) -> Any:
     """A formula made of lines of source, for what would repeat the same line for each field of a record."""
     body = "\n".join(f"    {line}" for line in lines)
-    source = f"def {name}({', '.join(arguments)}):\n{body}\n"
-    names: dict[str, Any] = {"__name__": __name__}
-    exec(compile(source, f"<{name}>", "exec"), names)
-    return formula(names[name])
+    return formula(generated(f"def {name}({', '.join(arguments)}):\n{body}\n"))
+
+
+def generated(source: str, **names: Any) -> FunctionType:
+    """The one function that a source text defines, for the decorators above; ``names`` are what the text refers to.
+
+    The text is kept where a traceback and ``fusing`` look for it.
+    """
+    place = f"<generated {hashlib.sha256(source.encode()).hexdigest()[:12]}>"
+    linecache.cache[place] = (len(source), None, source.splitlines(keepends=True), place)
+    scope: dict[str, Any] = {"__name__": __name__, **names}
+    before = {"__builtins__", *scope}
+    exec(compile(source, place, "exec"), scope)
+    (function,) = (scope[name] for name in scope if name not in before)
+    return function
 
 
 def borrowed(array: Any) -> Any:
     """The same array without a share in its ownership, for as long as the caller holds it.
 
     A formula that takes an array counts its owners up and down, an atomic operation each, wherever a branch hides from Numba that the two
-    cancel: in a loop over walkers they cost several times what the formulas do.
+    cancel: in a loop over walkers they cost several times what the formulas do. In plain Python, of an array of records the one whose
+    fields are attributes, as compiled code has them.
     """
-    return array
+    return array.view(np.recarray) if array.dtype.names else array
 
 
 def _without_owner_code(typing_context, array):
@@ -110,8 +125,7 @@ def _ingredients(
             files.add(code.co_filename)
         else:
             constants.add(f"{code.co_name} = {code.co_code!r} {code.co_consts!r} {code.co_names!r}")
-        for name in code.co_names:
-            named = each.__globals__.get(name)
+        for name, named in _names(each):
             named = getattr(named, "py_func", named)
             home = named.__name__ if isinstance(named, ModuleType) else _home(named)
             if isinstance(named, (bool, int, float, tuple)):
@@ -123,6 +137,14 @@ def _ingredients(
             else:
                 files.add(str(sys.modules[home].__file__))
     return files, constants
+
+
+def _names(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
+    """What a function's names stand for, those of its module and those of the functions around it."""
+    code = function.__code__
+    yield from ((name, function.__globals__.get(name)) for name in code.co_names)
+    for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
+        yield name, cell.cell_contents
 
 
 def _home(named: Any) -> str:
@@ -139,7 +161,9 @@ def _digest(function: Callable[..., Any], formulas: Iterable[Callable[..., Any]]
     return digest.hexdigest()
 
 
-def entry_point(formulas: Iterable[Callable[..., Any]] = (), **options: Any) -> Callable[[Callable[..., Any]], Any]:
+def entry_point(
+    formulas: Iterable[Callable[..., Any]] = (), **options: Any
+) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function that Python calls, releasing the GIL, and keep its machine code on disk.
 
     Numba renews its cache when the entry point's own file changes, but not when a formula inlined from another file does. A digest
@@ -151,6 +175,7 @@ def entry_point(formulas: Iterable[Callable[..., Any]] = (), **options: Any) -> 
         dispatcher = _njit(nogil=True, **_OPTIONS, **options)(function)
         if not hasattr(dispatcher, "enable_caching"):  # NUMBA_DISABLE_JIT=1 leaves a plain function
             return dispatcher
+        NOTICE.watch(dispatcher)
         try:
             dispatcher.enable_caching()
         except RuntimeError:

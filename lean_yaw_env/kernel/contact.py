@@ -11,7 +11,7 @@ from __future__ import annotations
 from lean_yaw_env.kernel import verner
 from lean_yaw_env.kernel.compilation import fused
 
-_LOOKS = (0.0, verner.C7, verner.C6, verner.C9, 1.0)
+_LOOKS = (0.0, verner.NODES[7], verner.NODES[6], verner.NODES[9], 1.0)
 
 
 def _weights(place: float) -> tuple[float, float, float, float, float]:

@@ -42,8 +42,7 @@ _T0, _T1, _T2, _T3, _T4 = 0.9998660, -0.3302995, 0.1801410, -0.0851330, 0.020835
 
 
 @fused
-def sine_cosine(angle):
-    """Sine and cosine of an angle between -pi and pi, to 4e-16 within a quarter turn and 4e-15 beyond."""
+def _sine_cosine(angle):
     half = 0.5 * angle
     z = half * half
     # fmt: off
@@ -53,6 +52,23 @@ def sine_cosine(angle):
         _C12 + z * (_C14 + z * _C16)))))))
     # fmt: on
     return 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
+
+
+def sine_cosine(angle: Any) -> Any:
+    """Sine and cosine of an angle between -pi and pi, to 4e-16 within a quarter turn and 4e-15 beyond."""
+    return _sine_cosine(angle)
+
+
+@by_type(sine_cosine)
+def _sine_cosine_by_type(angle):
+    if not isinstance(angle, types.Complex):
+        return lambda angle: _sine_cosine(angle)
+
+    def with_derivative(angle):
+        sine, cosine = _sine_cosine(angle.real)
+        return complex(sine, cosine * angle.imag), complex(cosine, -sine * angle.imag)
+
+    return with_derivative
 
 
 @fused

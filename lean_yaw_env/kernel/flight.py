@@ -182,107 +182,24 @@ def is_collapsing(stance, time, sin_a, cos_a, sin_twist, cos_twist, upright):
     return (cos_twist.real <= 0.0) | (upright.real <= 0.0) | (not independent)
 
 
+_integrate = verner.stepper(2, pose_of, accelerations_in, look=forces_in, looks=(7, 6, 9))
+
+
 @fused
-def stance_step(c, t, x, b, w, v, dw1, dv1, h):
+def stance_step(c, t, x, b, w, v, dw, dv, h):
     """One step of Verner's pair for pitch x, twist b and their rates w, v.
 
     Returns the new coordinates and rates, the largest error estimate, the damping's loss, and, at stages 7, 6 and 9, the normal force and
     the square of the tangential one.
-
-    A stage's pose does not depend on the accelerations of the stage before: it is written ahead of them, so that a processor does both at
-    a time.
     """
-    # fmt: off
-    pose2 = pose_of(
-        c, t + verner.C2 * h, verner.stage_2(x, h, w),
-        verner.stage_2(b, h, v))
-    w2 = verner.stage_2(w, h, dw1)
-    v2 = verner.stage_2(v, h, dv1)
-    pose3 = pose_of(
-        c, t + verner.C3 * h, verner.stage_3(x, h, w, w2),
-        verner.stage_3(b, h, v, v2))
-    dw2, dv2 = accelerations_in(c, pose2, w2, v2)
-    w3 = verner.stage_3(w, h, dw1, dw2)
-    v3 = verner.stage_3(v, h, dv1, dv2)
-    pose4 = pose_of(
-        c, t + verner.C4 * h, verner.stage_4(x, h, w, w3),
-        verner.stage_4(b, h, v, v3))
-    dw3, dv3 = accelerations_in(c, pose3, w3, v3)
-    w4 = verner.stage_4(w, h, dw1, dw3)
-    v4 = verner.stage_4(v, h, dv1, dv3)
-    pose5 = pose_of(
-        c, t + verner.C5 * h, verner.stage_5(x, h, w, w3, w4),
-        verner.stage_5(b, h, v, v3, v4))
-    dw4, dv4 = accelerations_in(c, pose4, w4, v4)
-    w5 = verner.stage_5(w, h, dw1, dw3, dw4)
-    v5 = verner.stage_5(v, h, dv1, dv3, dv4)
-    pose6 = pose_of(
-        c, t + verner.C6 * h, verner.stage_6(x, h, w, w4, w5),
-        verner.stage_6(b, h, v, v4, v5))
-    dw5, dv5 = accelerations_in(c, pose5, w5, v5)
-    w6 = verner.stage_6(w, h, dw1, dw4, dw5)
-    v6 = verner.stage_6(v, h, dv1, dv4, dv5)
-    pose7 = pose_of(
-        c, t + verner.C7 * h, verner.stage_7(x, h, w, w4, w5, w6),
-        verner.stage_7(b, h, v, v4, v5, v6))
-    dw6, dv6, normal6, square6 = forces_in(c, pose6, w6, v6)
-    w7 = verner.stage_7(w, h, dw1, dw4, dw5, dw6)
-    v7 = verner.stage_7(v, h, dv1, dv4, dv5, dv6)
-    pose8 = pose_of(
-        c, t + verner.C8 * h, verner.stage_8(x, h, w, w4, w5, w6, w7),
-        verner.stage_8(b, h, v, v4, v5, v6, v7))
-    dw7, dv7, normal7, square7 = forces_in(c, pose7, w7, v7)
-    w8 = verner.stage_8(w, h, dw1, dw4, dw5, dw6, dw7)
-    v8 = verner.stage_8(v, h, dv1, dv4, dv5, dv6, dv7)
-    pose9 = pose_of(
-        c, t + verner.C9 * h, verner.stage_9(x, h, w, w4, w5, w6, w7, w8),
-        verner.stage_9(b, h, v, v4, v5, v6, v7, v8))
-    dw8, dv8 = accelerations_in(c, pose8, w8, v8)
-    w9 = verner.stage_9(w, h, dw1, dw4, dw5, dw6, dw7, dw8)
-    v9 = verner.stage_9(v, h, dv1, dv4, dv5, dv6, dv7, dv8)
-    pose10 = pose_of(
-        c, t + verner.C10 * h, verner.stage_10(x, h, w, w4, w5, w6, w7, w8, w9),
-        verner.stage_10(b, h, v, v4, v5, v6, v7, v8, v9))
-    dw9, dv9, normal9, square9 = forces_in(c, pose9, w9, v9)
-    w10 = verner.stage_10(w, h, dw1, dw4, dw5, dw6, dw7, dw8, dw9)
-    v10 = verner.stage_10(v, h, dv1, dv4, dv5, dv6, dv7, dv8, dv9)
-    pose11 = pose_of(
-        c, t + verner.C11 * h, verner.stage_11(x, h, w, w4, w5, w6, w7, w8, w9, w10),
-        verner.stage_11(b, h, v, v4, v5, v6, v7, v8, v9, v10))
-    dw10, dv10 = accelerations_in(c, pose10, w10, v10)
-    w11 = verner.stage_11(w, h, dw1, dw4, dw5, dw6, dw7, dw8, dw9, dw10)
-    v11 = verner.stage_11(v, h, dv1, dv4, dv5, dv6, dv7, dv8, dv9, dv10)
-    pose12 = pose_of(
-        c, t + h, verner.stage_12(x, h, w, w4, w5, w6, w7, w8, w9, w10, w11),
-        verner.stage_12(b, h, v, v4, v5, v6, v7, v8, v9, v10, v11))
-    dw11, dv11 = accelerations_in(c, pose11, w11, v11)
-    w12 = verner.stage_12(w, h, dw1, dw4, dw5, dw6, dw7, dw8, dw9, dw10, dw11)
-    v12 = verner.stage_12(v, h, dv1, dv4, dv5, dv6, dv7, dv8, dv9, dv10, dv11)
-    pose13 = pose_of(
-        c, t + h, verner.stage_13(x, h, w, w4, w5, w6, w7, w8, w9, w10),
-        verner.stage_13(b, h, v, v4, v5, v6, v7, v8, v9, v10))
-    dw12, dv12 = accelerations_in(c, pose12, w12, v12)
-    w13 = verner.stage_13(w, h, dw1, dw4, dw5, dw6, dw7, dw8, dw9, dw10)
-    v13 = verner.stage_13(v, h, dv1, dv4, dv5, dv6, dv7, dv8, dv9, dv10)
-    dw13, dv13 = accelerations_in(c, pose13, w13, v13)
-
-    error_x = abs(verner.error(h, w, w6, w7, w8, w9, w10, w11, w12, w13).real)
-    error_b = abs(verner.error(h, v, v6, v7, v8, v9, v10, v11, v12, v13).real)
-    error_w = abs(verner.error(h, dw1, dw6, dw7, dw8, dw9, dw10, dw11, dw12, dw13).real)
-    error_v = abs(verner.error(h, dv1, dv6, dv7, dv8, dv9, dv10, dv11, dv12, dv13).real)
-    error = max(max(error_x, error_b), max(error_w, error_v))
-    loss = c.ankle_damping * verner.result(
-        0.0, h, v * v, v6 * v6, v7 * v7, v8 * v8, v9 * v9, v10 * v10, v11 * v11, v12 * v12)
-    return (
-        verner.result(x, h, w, w6, w7, w8, w9, w10, w11, w12),
-        verner.result(b, h, v, v6, v7, v8, v9, v10, v11, v12),
-        verner.result(w, h, dw1, dw6, dw7, dw8, dw9, dw10, dw11, dw12),
-        verner.result(v, h, dv1, dv6, dv7, dv8, dv9, dv10, dv11, dv12),
-        error, loss,
-        (normal7.real, normal6.real, normal9.real),
-        (square7.real, square6.real, square9.real),
+    x, b, w, v, error, rates, (seen_7, seen_6, seen_9) = _integrate(c, t, x, b, w, v, dw, dv, h)
+    v1, v6, v7, v8, v9, v10, v11, v12 = rates
+    loss = c.ankle_damping * verner.integral(
+        h, v1 * v1, v6 * v6, v7 * v7, v8 * v8, v9 * v9, v10 * v10, v11 * v11, v12 * v12
     )
-    # fmt: on
+    normals = (seen_7[2].real, seen_6[2].real, seen_9[2].real)
+    squares = (seen_7[3].real, seen_6[3].real, seen_9[3].real)
+    return x, b, w, v, error, loss, normals, squares
 
 
 @fused

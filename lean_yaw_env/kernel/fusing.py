@@ -3,6 +3,9 @@
 A compiler that is free to fuse does so as it pleases, one way in a loop over walkers and another for a single one, and their bits differ.
 Here the source decides: in a decorated formula each ``a * b + c`` is one fused operation, in every kernel that inlines it. Processors
 without such an operation (x86 before 2013) get the same bits from a library, slowly.
+
+Complex numbers carry a derivative in a tiny imaginary part. Their products and sums are taken to first order in it, which is all of a
+derivative, and which leaves real parts with the bits of a formula of floats.
 """
 
 from __future__ import annotations
@@ -14,33 +17,39 @@ from types import FunctionType
 from typing import Any
 
 from numba.core import types
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
 
-_NAME = "_multiply_add"
+_PRODUCT, _SUM = "_multiply", "_multiply_add"
+_NUMBERS = (types.Float, types.Integer, types.Complex)
 
 
-def _fused_code(typing_context, a, b, c):
-    numbers = (types.Float, types.Integer, types.Complex)
-    if not all(isinstance(kind, numbers) for kind in (a, b, c)):
+def _product_code(typing_context, a, b):
+    return _first_order((a, b), lambda builder, a, b: builder.fmul(a, b), _product_derivative)
+
+
+def _sum_code(typing_context, a, b, c):
+    return _first_order((a, b, c), lambda builder, a, b, c: builder.fma(a, b, c), _sum_derivative)
+
+
+def _first_order(kinds, value, derivative):
+    """Type and code of an operation on floats; on complex numbers real and imaginary parts are two such operations."""
+    if not all(isinstance(kind, _NUMBERS) for kind in kinds):
         return None
-    is_complex = any(isinstance(kind, types.Complex) for kind in (a, b, c))
+    is_complex = any(isinstance(kind, types.Complex) for kind in kinds)
     result = types.complex128 if is_complex else types.float64
 
     def generate(context, builder, signature, values):
-        arguments = zip(signature.args, values, strict=True)
-        (a, a_part), (b, b_part), (c, part) = (
-            _parts(context, builder, *each) for each in arguments
-        )
-        real = builder.fma(a, b, c)
+        parts = [
+            _parts(context, builder, *each) for each in zip(signature.args, values, strict=True)
+        ]
+        real = value(builder, *(part[0] for part in parts))
         if not is_complex:
             return real
-        part = _add_product(builder, a, b_part, part)
-        part = _add_product(builder, a_part, b, part)
         number = context.make_complex(builder, types.complex128)
-        number.real, number.imag = real, part
+        number.real, number.imag = real, derivative(builder, *parts)
         return number._getvalue()
 
-    return result(a, b, c), generate
+    return result(*kinds), generate
 
 
 def _parts(context, builder, kind, value):
@@ -51,45 +60,50 @@ def _parts(context, builder, kind, value):
     return context.cast(builder, value, types.unliteral(kind), types.float64), None
 
 
+def _product_derivative(builder, a, b):
+    return _sum_derivative(builder, a, b, (None, None))
+
+
+def _sum_derivative(builder, a, b, c):
+    """The imaginary part of a * b + c to first order: of each product only what has a factor."""
+    total = _add_product(builder, a[0], b[1], c[1])
+    return _add_product(builder, a[1], b[0], total)
+
+
 def _add_product(builder, factor, other, total):
     if factor is None or other is None:
         return total
     return builder.fmul(factor, other) if total is None else builder.fma(factor, other, total)
 
 
-# The code's first argument is the compiler's own, which the type hints do not know; nor what numba decorates
-_operation: Any = intrinsic(_fused_code)
-_overload: Any = overload
-
-
-def multiply_add(a: Any, b: Any, c: Any) -> Any:
-    """a * b + c, compiled as one operation; of complex numbers to first order in their imaginary parts, which is all of a derivative."""
-    return a * b + c
-
-
-@_overload(multiply_add, jit_options={"forceinline": True})
-def _multiply_add(a, b, c):
-    return lambda a, b, c: _operation(a, b, c)
+# The code's first argument is the compiler's own, which the type hints do not know
+multiply: Any = intrinsic(_product_code)
+"""a * b, compiled as one operation."""
+multiply_add: Any = intrinsic(_sum_code)
+"""a * b + c, compiled as one operation."""
 
 
 class _Fusing(ast.NodeTransformer):
-    """Puts a call in the place of each sum or difference of which a product is part."""
+    """Puts a call in the place of each product, and of each sum or difference of which a product is part."""
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
-        self.generic_visit(node)
         left, right = node.left, node.right
-        if not isinstance(node.op, (ast.Add, ast.Sub)):
-            return node
         differs = isinstance(node.op, ast.Sub)
-        if isinstance(right, ast.BinOp) and isinstance(right.op, ast.Mult):
-            factor = ast.UnaryOp(ast.USub(), right.left) if differs else right.left
-            arguments: list[ast.expr] = [factor, right.right, left]
-        elif isinstance(left, ast.BinOp) and isinstance(left.op, ast.Mult):
-            term = ast.UnaryOp(ast.USub(), right) if differs else right
-            arguments = [left.left, left.right, term]
-        else:
-            return node
-        return ast.Call(ast.Name(_NAME, ast.Load()), arguments, [])
+        if isinstance(node.op, ast.Mult):
+            return self._call(_PRODUCT, left, right)
+        if isinstance(node.op, (ast.Add, ast.Sub)):
+            if isinstance(right, ast.BinOp) and isinstance(right.op, ast.Mult):
+                factor = ast.UnaryOp(ast.USub(), right.left) if differs else right.left
+                return self._call(_SUM, factor, right.right, left)
+            if isinstance(left, ast.BinOp) and isinstance(left.op, ast.Mult):
+                term = ast.UnaryOp(ast.USub(), right) if differs else right
+                return self._call(_SUM, left.left, left.right, term)
+        return ast.BinOp(self.visit(left), node.op, self.visit(right))
+
+    def _call(self, name: str, *arguments: ast.expr) -> ast.expr:
+        return ast.Call(
+            ast.Name(name, ast.Load()), [self.visit(argument) for argument in arguments], []
+        )
 
 
 def fuse(function: FunctionType) -> FunctionType:
@@ -100,8 +114,8 @@ def fuse(function: FunctionType) -> FunctionType:
     assert isinstance(definition, ast.FunctionDef)
     definition.decorator_list = []
     _Fusing().visit(definition)
-    # a function around it hands the operation over without a name among the module's own
-    around = ast.parse(f"def around({_NAME}):\n    return {definition.name}")
+    # a function around it hands the operations over without names among the module's own
+    around = ast.parse(f"def around({_PRODUCT}, {_SUM}):\n    return {definition.name}")
     outer = around.body[0]
     assert isinstance(outer, ast.FunctionDef)
     outer.body.insert(0, definition)
@@ -109,4 +123,4 @@ def fuse(function: FunctionType) -> FunctionType:
     names: dict[str, Any] = {}
     code = compile(ast.fix_missing_locations(around), function.__code__.co_filename, "exec")
     exec(code, function.__globals__, names)
-    return names["around"](multiply_add)
+    return names["around"](multiply, multiply_add)

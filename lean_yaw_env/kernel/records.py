@@ -46,6 +46,16 @@ class Command(NamedTuple):
     previous_offset: float
 
 
+class SectionState(NamedTuple):
+    """Where a walker is just after heel strike."""
+
+    heading: float
+    stance_pitch: float
+    ankle_angle: float
+    stance_pitch_rate: float
+    ankle_rate: float
+
+
 class Stance(NamedTuple):
     """What is constant while one foot stands. Axes: the stance foot's heading, the floor's normal, to the right."""
 
@@ -67,6 +77,7 @@ class Stance(NamedTuple):
     shift_rate: float  # one over the shift's duration
     friction_limit_squared: float
     max_duration: float
+    heading: float
 
 
 class Flight(NamedTuple):
@@ -117,3 +128,15 @@ class Outcome(NamedTuple):
     impact_loss: float
     ankle_loss: float
     evaluations: float
+
+
+BODY_INPUTS = Body._fields[:6]
+"""The constants of a walker by which a step is differentiated."""
+
+WITHOUT_DERIVATIVE = frozenset(
+    {
+        *Body._fields[6:], "shift_rate", "friction_limit_squared", "max_duration", "next_step", "normal_force", "tangential_squared",
+        "least_normal_force", "friction_squared", "evaluations", "attempts", "status",
+    }
+)  # fmt: skip
+"""Fields of all these records that stay real where others are complex to carry a derivative."""

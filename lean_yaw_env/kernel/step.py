@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from lean_yaw_env.kernel.blocks import Model
 from lean_yaw_env.kernel.compilation import entry_point, fused, inlined
 from lean_yaw_env.kernel.elementary import quotient, sine_cosine, within_half_turn
 from lean_yaw_env.kernel.flight import (
@@ -18,8 +19,10 @@ from lean_yaw_env.kernel.flight import (
     time_to_touch,
 )
 from lean_yaw_env.kernel.heel_strike import impact, landing_place, landing_pose
+from lean_yaw_env.kernel.lanes import row_reader, row_writer
 from lean_yaw_env.kernel.records import (
     BACKWARD,
+    BODY_INPUTS,
     FAILED,
     FLYING,
     LANDING,
@@ -32,6 +35,7 @@ from lean_yaw_env.kernel.records import (
     Command,
     Flight,
     Outcome,
+    SectionState,
     Stance,
 )
 from lean_yaw_env.kernel.stance import (
@@ -77,12 +81,16 @@ def stance_of(body, command, heading, side):
         1.0 / body.shift_time,
         body.friction_limit * body.friction_limit,
         body.max_step_duration,
+        heading,
     )
 
 
 @fused
-def start(stance, body, pitch, twist, pitch_rate, twist_rate):
-    """The flight just after heel strike: it may be a fall already, or (as an option) an immediate heel strike."""
+def begin(body, command, state, side):
+    """Stance and flight just after heel strike: it may be a fall already, or (as an option) an immediate heel strike."""
+    stance = stance_of(body, command, state.heading, side)
+    pitch, twist = state.stance_pitch, -state.ankle_angle
+    pitch_rate, twist_rate = state.stance_pitch_rate, -state.ankle_rate
     sin_a, cos_a = sine_cosine(pitch + stance.tilt)
     sin_twist, cos_twist = sine_cosine(twist)
     time = 0.0 * pitch
@@ -111,11 +119,12 @@ def start(stance, body, pitch, twist, pitch_rate, twist_rate):
     status = SIDEWAYS if collapses else status
     status = SLIP if friction.real > stance.friction_limit_squared.real else status
     status = LIFT_OFF if normal.real <= 0.0 else status
-    return Flight(
+    flight = Flight(
         time, pitch, twist, pitch_rate, twist_rate, dw, dv, gap, gap_rate, gap_acceleration,
         0.0 if strikes else first, normal.real, square.real, normal.real, friction.real, time, 1.0, 0.0, status,
         pitch, twist, kinetic_energy(m11, m12, m22, pitch_rate, twist_rate),
     )  # fmt: skip
+    return stance, flight
 
 
 @fused
@@ -142,11 +151,28 @@ def short_step(c, t, x, b, w, v, dw1, dv1, h):
 
 
 @fused
-def touch_down(stance, flight):
-    """Follow a landing flight to where the gap is zero, to round-off: a short step, then two Newton corrections in time.
+def correct_landing(stance, time, x, b, w, v, dw, dv, jerk_w, jerk_v, loss):
+    """One Newton correction of the time at which the gap is zero, and the motion by its Taylor series; also the gap before it.
 
-    The corrections carry complex parts, so that the landing time has its derivatives.
+    The correction carries a complex part, so that the landing time has its derivatives.
     """
+    sin_a, cos_a = sine_cosine(x + stance.tilt)
+    sin_twist, cos_twist = sine_cosine(b)
+    gap, gap_rate, _, _ = foot_gap(stance, sin_a, cos_a, sin_twist, cos_twist, w, v, dw, dv)
+    correction = quotient(-gap, gap_rate)
+    x = x + correction * (w + correction * (0.5 * dw + _SIXTH * correction * jerk_w))
+    b = b + correction * (v + correction * (0.5 * dv + _SIXTH * correction * jerk_v))
+    w = w + correction * (dw + 0.5 * correction * jerk_w)
+    v = v + correction * (dv + 0.5 * correction * jerk_v)
+    dw = dw + correction * jerk_w
+    dv = dv + correction * jerk_v
+    loss = loss + correction * stance.ankle_damping * v * v
+    return time + correction, x, b, w, v, dw, dv, loss, gap
+
+
+@fused
+def touch_down(stance, flight):
+    """Follow a landing flight to where the gap is zero, to round-off: a short step, then two Newton corrections in time."""
     h = flight.next_step
     x, b, w, v, loss = short_step(
         stance, flight.time, flight.pitch, flight.twist, flight.pitch_rate, flight.twist_rate,
@@ -157,25 +183,18 @@ def touch_down(stance, flight):
     per_step = 1.0 / h if h != 0.0 else 0.0
     jerk_w = (dw - flight.pitch_acceleration) * per_step
     jerk_v = (dv - flight.twist_acceleration) * per_step
-    gap = flight.gap
-    for _ in range(2):
-        sin_a, cos_a = sine_cosine(x + stance.tilt)
-        sin_twist, cos_twist = sine_cosine(b)
-        gap, gap_rate, _, _ = foot_gap(stance, sin_a, cos_a, sin_twist, cos_twist, w, v, dw, dv)
-        correction = quotient(-gap, gap_rate)
-        time = time + correction
-        x = x + correction * (w + correction * (0.5 * dw + _SIXTH * correction * jerk_w))
-        b = b + correction * (v + correction * (0.5 * dv + _SIXTH * correction * jerk_v))
-        w = w + correction * (dw + 0.5 * correction * jerk_w)
-        v = v + correction * (dv + 0.5 * correction * jerk_v)
-        dw = dw + correction * jerk_w
-        dv = dv + correction * jerk_v
-        loss = loss + correction * stance.ankle_damping * v * v
+    # twice in line: a loop of as much is not unrolled, and then the one over walkers not vectorised
+    time, x, b, w, v, dw, dv, loss, gap = correct_landing(
+        stance, time, x, b, w, v, dw, dv, jerk_w, jerk_v, loss
+    )
+    time, x, b, w, v, dw, dv, loss, gap = correct_landing(
+        stance, time, x, b, w, v, dw, dv, jerk_w, jerk_v, loss
+    )
     return time, x, b, w, v, gap, flight.damping_loss + loss
 
 
 @fused
-def finish(stance, heading, flight):
+def finish(stance, flight):
     """The outcome of a flight that has ended: the heel strike of one that lands, the last state of one that fell."""
     landing = flight.status == LANDING
     # An immediate strike has no gap to close: the foot is in the floor already
@@ -236,10 +255,10 @@ def finish(stance, heading, flight):
     )
     shifts = stance.offset_change.real != 0.0
     shift_work = before - flight.start_kinetic - gravity_work + ankle_loss
-    sin_heading, cos_heading = sine_cosine(within_half_turn(heading))
+    sin_heading, cos_heading = sine_cosine(within_half_turn(stance.heading))
     nothing = 0.0 * x
     return Outcome(
-        heading + turn if stepped else heading + nothing,
+        stance.heading + turn if stepped else stance.heading + nothing,
         new_x if stepped else x,
         -new_b if stepped else -b,
         new_w if stepped else w,
@@ -263,26 +282,38 @@ def finish(stance, heading, flight):
 @inlined
 def walking_step(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side):
     """One walking step; numbers may be complex to carry a derivative, every decision looks at real parts."""
-    stance = stance_of(body, command, heading, side)
-    flight = start(stance, body, pitch, -ankle, pitch_rate, -ankle_rate)
+    state = SectionState(heading, pitch, ankle, pitch_rate, ankle_rate)
+    stance, flight = begin(body, command, state, side)
     while flight.status == FLYING:
         flight = advance(stance, flight)
-    return finish(stance, heading, flight)
+    return finish(stance, flight)
 
 
-@inlined
-def body_of(row):
-    """A walker's constants from a row of numbers."""
-    return Body(
-        row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9], row[10]
-    )
+ACTIVE = Model(
+    command=Command,
+    state=SectionState,
+    stance=Stance,
+    flight=Flight,
+    outcome=Outcome,
+    inputs=(*SectionState._fields, *Command._fields, *BODY_INPUTS),
+    outputs=(
+        *SectionState._fields,
+        "duration",
+        "displacement_x",
+        "displacement_z",
+        "mass_offset",
+        "shift_work",
+    ),
+    begin=begin,
+    advance=advance,
+    finish=finish,
+)
+"""The walker whose swing leg is held in front."""
 
 
-@inlined
-def write_outcome(outcome, row):
-    """Write an outcome's fields to a row of numbers, in order."""
-    for k, value in enumerate(outcome):
-        row[k] = value
+body_of = row_reader(Body)
+command_of = row_reader(Command)
+write_outcome = row_writer(Outcome)
 
 
 @entry_point()
@@ -293,7 +324,7 @@ def step(body, command, state, side, outcome):
     """
     result = walking_step(
         body_of(body),
-        Command(command[0], command[1], command[2]),
+        command_of(command),
         state[0],
         state[1],
         state[2],

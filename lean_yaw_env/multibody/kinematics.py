@@ -78,22 +78,31 @@ class Kinematics:
     pitch_bias: float
 
 
+def _about_x(c: Any, s: Any) -> list[list[Any]]:
+    return [[1, 0, 0], [0, c, -s], [0, s, c]]
+
+
+def _about_y(c: Any, s: Any) -> list[list[Any]]:
+    return [[c, 0, s], [0, 1, 0], [-s, 0, c]]
+
+
+def _about_z(c: Any, s: Any) -> list[list[Any]]:
+    return [[c, -s, 0], [s, c, 0], [0, 0, 1]]
+
+
 def rotation_x(angle: float) -> Vector:
     """Right-handed rotation about x by ``angle`` rad, shape (3, 3)."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    return np.array(_about_x(np.cos(angle), np.sin(angle)), dtype=np.float64)
 
 
 def rotation_y(angle: float) -> Vector:
     """Right-handed rotation about y by ``angle`` rad, shape (3, 3)."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    return np.array(_about_y(np.cos(angle), np.sin(angle)), dtype=np.float64)
 
 
 def rotation_z(angle: float) -> Vector:
     """Right-handed rotation about z by ``angle`` rad, shape (3, 3)."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return np.array(_about_z(np.cos(angle), np.sin(angle)), dtype=np.float64)
 
 
 def rotation_ankle(angle: float, tilt: float) -> Vector:
@@ -117,31 +126,22 @@ def _compiled() -> Callable[..., Any]:
     heading, contact_x, contact_z = sp.symbols("phi x_c z_c")
     x, y, z, yaw, lean, stance_pitch, swing_pitch, ankle, offset = coordinates
 
-    def about_x(angle: Any) -> Any:
-        c, s = sp.cos(angle), sp.sin(angle)
-        return sp.Matrix([[1, 0, 0], [0, c, -s], [0, s, c]])
-
-    def about_y(angle: Any) -> Any:
-        c, s = sp.cos(angle), sp.sin(angle)
-        return sp.Matrix([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-
-    def about_z(angle: Any) -> Any:
-        c, s = sp.cos(angle), sp.sin(angle)
-        return sp.Matrix([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    def turned(about: Callable[[Any, Any], list[list[Any]]], angle: Any) -> Any:
+        return sp.Matrix(about(sp.cos(angle), sp.sin(angle)))
 
     e1, e2, e3 = (sp.Matrix([int(i == j) for i in range(3)]) for j in range(3))
-    axle_frame = about_y(yaw) * about_x(lean)
+    axle_frame = turned(_about_y, yaw) * turned(_about_x, lean)
     axle = axle_frame * e3
     centre = sp.Matrix([x, y, z])
     stance_hip = centre - side * hip_width / 2 * axle
     swing_hip = centre + side * hip_width / 2 * axle
-    stance_leg = axle_frame * about_z(stance_pitch)
-    swing_leg = axle_frame * about_z(swing_pitch)
+    stance_leg = axle_frame * turned(_about_z, stance_pitch)
+    swing_leg = axle_frame * turned(_about_z, swing_pitch)
     stance_end = stance_hip - stance_leg * e2
     swing_end = swing_hip - swing_leg * e2
 
     # leg = foot * R_a(ankle); the ankle axis is the y axis turned over and tilted about z.
-    foot = stance_leg * about_z(tilt) * about_y(ankle) * about_z(-tilt)
+    foot = stance_leg * turned(_about_z, tilt) * turned(_about_y, ankle) * turned(_about_z, -tilt)
     cylinder = stance_end + foot_radius * foot * e2
     ahead = sp.Matrix([sp.cos(heading), 0, -sp.sin(heading)])
     across = sp.Matrix([sp.sin(heading), 0, sp.cos(heading)])

@@ -27,6 +27,7 @@ from lean_yaw_env.multibody.kinematics import (
     N_COORDINATES,
     STANCE_LEG,
     SWING_LEG,
+    Kinematics,
     Vector,
 )
 from lean_yaw_env.multibody.shift import Shift
@@ -48,22 +49,9 @@ class Phase:
     shift: Shift
     is_held: bool
 
-    def derivative(self, time: float, y: Vector) -> Vector:
-        """Time derivative of ``y``."""
-        coordinates, rates = y[:N_COORDINATES], y[N_COORDINATES:]
-        second, _, _ = accelerations(
-            self.body,
-            self.stance,
-            coordinates,
-            rates,
-            offset=self.shift.at(time),
-            is_held=self.is_held,
-        )
-        return np.concatenate([rates, second])
-
-    def forces(self, time: float, y: Vector) -> ContactForces:
-        """What the floor does to the stance foot."""
-        _, multipliers, _ = accelerations(
+    def accelerations(self, time: float, y: Vector) -> tuple[Vector, Vector, Kinematics]:
+        """Accelerations, multipliers and kinematics; see ``dynamics.accelerations``."""
+        return accelerations(
             self.body,
             self.stance,
             y[:N_COORDINATES],
@@ -71,7 +59,14 @@ class Phase:
             offset=self.shift.at(time),
             is_held=self.is_held,
         )
-        return forces_from_multipliers(self.body, multipliers)
+
+    def derivative(self, time: float, y: Vector) -> Vector:
+        """Time derivative of ``y``."""
+        return np.concatenate([y[N_COORDINATES:], self.accelerations(time, y)[0]])
+
+    def forces(self, time: float, y: Vector) -> ContactForces:
+        """What the floor does to the stance foot."""
+        return forces_from_multipliers(self.body, self.accelerations(time, y)[1])
 
     def energies(self, time: float, y: Vector) -> tuple[float, float]:
         """Kinetic and potential energy."""

@@ -14,7 +14,6 @@ from lean_yaw_env.multibody.dynamics import (
     ContactForces,
     Offset,
     Stance,
-    accelerations,
     energy,
     evaluate,
     exchange_roles,
@@ -120,13 +119,7 @@ class MultibodyWalker(Body):
             If an argument is out of range or missing.
         """
         phase, start = self._start(
-            state,
-            stance=stance,
-            inter_leg_angle=inter_leg_angle,
-            mass_offset=mass_offset,
-            previous_offset=previous_offset,
-            swing=swing,
-            swing_rate=swing_rate,
+            state, stance, inter_leg_angle, mass_offset, previous_offset, swing, swing_rate
         )
         end = integrate(phase, start, self.tolerance)
         kept = _trajectory(phase, end) if trajectory else None
@@ -140,14 +133,7 @@ class MultibodyWalker(Body):
         Arguments and errors as for `step`; evaluated at the start of the step.
         """
         phase, y = self._start(state, **options)
-        second, _, here = accelerations(
-            self,
-            phase.stance,
-            y[:N_COORDINATES],
-            y[N_COORDINATES:],
-            offset=phase.shift.at(0.0),
-            is_held=phase.is_held,
-        )
+        second, _, here = phase.accelerations(0.0, y)
         pitch = float(here.pitch_jacobian[:N_COORDINATES] @ second) + here.pitch_bias
         independent = (pitch, float(second[STANCE_ANKLE]))
         if phase.is_held:
@@ -162,7 +148,6 @@ class MultibodyWalker(Body):
     def _start(
         self,
         state: Sequence[float] | Vector,
-        *,
         stance: str = "left",
         inter_leg_angle: float = 0.3,
         mass_offset: float = 0.0,

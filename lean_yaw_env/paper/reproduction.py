@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from lean_yaw_env.errors import LeanYawError
+from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.files import write_text
 from lean_yaw_env.paper.checks import VERDICTS, Check
 from lean_yaw_env.paper.registry import pieces_named
@@ -22,6 +23,7 @@ CHECK_COLUMNS = (
     "paper",
     "ours",
     "difference",
+    "allowed",
     "verdict",
     "remark",
 )
@@ -76,12 +78,7 @@ class Reproduction:
         ]
 
 
-def reproduce(
-    names: Sequence[str],
-    folder: Path,
-    *,
-    before_each: Callable[[Piece], None] = lambda piece: None,
-) -> Reproduction:
+def reproduce(names: Sequence[str], folder: Path, *, progress: bool = False) -> Reproduction:
     """Compute pieces of the paper and write their pictures (PNG) and numbers (CSV).
 
     Each file is written whole or not at all as soon as it is known, so that an interruption costs
@@ -92,8 +89,8 @@ def reproduce(
     names : names of pieces, or "all"
     folder : Path
         Created if it does not exist.
-    before_each : function of the piece about to be computed
-        For a progress bar.
+    progress : bool
+        Show a progress bar.
 
     Raises
     ------
@@ -102,13 +99,16 @@ def reproduce(
     LeanYawError
         If a piece cannot be computed; names it.
     """
+    with needs_extra("analysis"):
+        from tqdm.auto import tqdm
     pieces = pieces_named(list(names))
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"the output folder {str(folder)!r} is a file")
     folder.mkdir(parents=True, exist_ok=True)
     done = []
-    for piece in pieces:
-        before_each(piece)
+    bar = tqdm(pieces, unit="piece", disable=not progress)
+    for piece in bar:
+        bar.set_description(piece.name)
         try:
             result = piece.make()
         except LeanYawError as error:

@@ -33,14 +33,6 @@ def turned(walk: Walk) -> float:
     return math.degrees(float(np.abs(walk.headings - walk.headings[0]).max()))
 
 
-def turning_radius(walk: Walk) -> float:
-    """Length walked per angle turned over the first right angle of a turn, leg lengths."""
-    strides = np.linalg.norm(walk.footprints[2::2] - walk.footprints[:-2:2], axis=1)
-    angles = np.abs(walk.headings[2::2] - walk.headings[0])
-    quarter = int(np.searchsorted(angles, 0.5 * math.pi))
-    return float(strides[: quarter + 1].sum() / angles[min(quarter, angles.size - 1)])
-
-
 def circling_walker() -> Walker:
     """Table 1's walker on a slope that turns with it."""
     return Walker(WalkerParameters(slope_turns=True))
@@ -49,8 +41,3 @@ def circling_walker() -> Walker:
 def circling_gait() -> LimitCycle:
     """Its gait with the large offset, which turns by as much every stride."""
     return find_limit_cycle(circling_walker(), mass_offset=LARGE_OFFSET)
-
-
-def circling_radius(gait: LimitCycle) -> float:
-    """Radius of the circle on which one foot's prints lie: a chord for each stride."""
-    return gait.step_length / abs(math.sin(0.5 * gait.turn))

@@ -33,6 +33,7 @@ BLUE: Colour = (0, 114, 178)
 VERMILION: Colour = (213, 94, 0)
 PURPLE: Colour = (204, 121, 167)
 LIGHT_GREY: Colour = (192, 192, 192)
+WINE: Colour = (136, 34, 85)
 
 AGENT_COLOURS: dict[str, Colour] = {
     "random": LIGHT_GREY,
@@ -43,6 +44,7 @@ AGENT_COLOURS: dict[str, Colour] = {
     "ppo": VERMILION,
     "sac": PURPLE,
     "apg": BLUE,
+    "her": WINE,
 }
 """The colour of each agent, the same in every picture."""
 SERIES_COLOURS: tuple[Colour, ...] = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY_BLUE, BLACK)

@@ -174,8 +174,8 @@ class CanonicalMatrices(NamedTuple):
     speed_stiffness: FloatArray
 
 
-class _Assembly(NamedTuple):
-    """Mass, centre of mass and inertia (about the axes said) of several bodies together."""
+class _Body(NamedTuple):
+    """Mass, centre of mass and inertia of a body, or of several bodies together."""
 
     mass: float
     x: float
@@ -185,51 +185,33 @@ class _Assembly(NamedTuple):
     zz: float
 
 
-def _whole_bicycle(p: BicycleParameters) -> _Assembly:
-    """All four bodies, inertia about the rear contact point."""
-    r, b, h, f, w = p.rear_wheel, p.rear_frame, p.front_frame, p.front_wheel, p.wheelbase
-    mass = r.mass + b.mass + h.mass + f.mass
-    moment_z = -r.radius * r.mass + b.z * b.mass + h.z * h.mass - f.radius * f.mass
-    return _Assembly(
-        mass=mass,
-        x=(b.x * b.mass + h.x * h.mass + w * f.mass) / mass,
-        z=moment_z / mass,
-        xx=r.inertia_xx
-        + b.inertia_xx
-        + h.inertia_xx
-        + f.inertia_xx
-        + r.mass * r.radius**2
-        + b.mass * b.z**2
-        + h.mass * h.z**2
-        + f.mass * f.radius**2,
-        xz=b.inertia_xz
-        + h.inertia_xz
-        - b.mass * b.x * b.z
-        - h.mass * h.x * h.z
-        + f.mass * w * f.radius,
-        zz=r.inertia_xx
-        + b.inertia_zz
-        + h.inertia_zz
-        + f.inertia_xx
-        + b.mass * b.x**2
-        + h.mass * h.x**2
-        + f.mass * w**2,
+def _bodies(p: BicycleParameters) -> tuple[_Body, ...]:
+    """Rear wheel, rear frame, front frame and front wheel, each with its inertia about its own centre of mass."""
+    rear, front = p.rear_wheel, p.front_wheel
+    frames = (
+        _Body(f.mass, f.x, f.z, f.inertia_xx, f.inertia_xz, f.inertia_zz)
+        for f in (p.rear_frame, p.front_frame)
+    )
+    return (
+        _Body(rear.mass, 0.0, -rear.radius, rear.inertia_xx, 0.0, rear.inertia_xx),
+        *frames,
+        _Body(front.mass, p.wheelbase, -front.radius, front.inertia_xx, 0.0, front.inertia_xx),
     )
 
 
-def _front_assembly(p: BicycleParameters) -> _Assembly:
-    """Fork and front wheel, inertia about their own centre of mass."""
-    h, f, w = p.front_frame, p.front_wheel, p.wheelbase
-    mass = h.mass + f.mass
-    x = (h.x * h.mass + w * f.mass) / mass
-    z = (h.z * h.mass - f.radius * f.mass) / mass
-    return _Assembly(
-        mass=mass,
-        x=x,
-        z=z,
-        xx=h.inertia_xx + f.inertia_xx + h.mass * (h.z - z) ** 2 + f.mass * (f.radius + z) ** 2,
-        xz=h.inertia_xz - h.mass * (h.x - x) * (h.z - z) + f.mass * (w - x) * (f.radius + z),
-        zz=h.inertia_zz + f.inertia_xx + h.mass * (h.x - x) ** 2 + f.mass * (w - x) ** 2,
+def _together(bodies: tuple[_Body, ...], about: tuple[float, float] | None = None) -> _Body:
+    """Bodies as one, with the inertia about a point (x, z), by default about their common centre of mass."""
+    mass = sum(b.mass for b in bodies)
+    x = sum(b.mass * b.x for b in bodies) / mass
+    z = sum(b.mass * b.z for b in bodies) / mass
+    x0, z0 = (x, z) if about is None else about
+    return _Body(
+        mass,
+        x,
+        z,
+        xx=sum(b.xx + b.mass * (b.z - z0) ** 2 for b in bodies),
+        xz=sum(b.xz - b.mass * (b.x - x0) * (b.z - z0) for b in bodies),
+        zz=sum(b.zz + b.mass * (b.x - x0) ** 2 for b in bodies),
     )
 
 
@@ -249,7 +231,8 @@ def canonical_matrices(parameters: BicycleParameters) -> CanonicalMatrices:
     -----
     Equations (A 1) to (A 24) of the 2007 benchmark paper, in their order and notation.
     """
-    whole, front = _whole_bicycle(parameters), _front_assembly(parameters)
+    bodies = _bodies(parameters)
+    whole, front = _together(bodies, about=(0.0, 0.0)), _together(bodies[2:])
     w, c = parameters.wheelbase, parameters.trail
     sine, cosine = math.sin(parameters.steer_axis_tilt), math.cos(parameters.steer_axis_tilt)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 
 from lean_yaw_env.envs.tasks.task import Command, Feature, Formula, Metric, Task
-from lean_yaw_env.registration import TASK_IDS, TASK_VERSIONS, name_of_task, register_id
+from lean_yaw_env.registration import ALL_TASKS, TASK_IDS, name_of_task, register_id
 from lean_yaw_env.validation import suggestion
 
 _REGISTERED: dict[str, Task] = {}
@@ -25,15 +25,15 @@ def task_named(task: str | Task) -> Task:
     name = name_of_task(task)
     if name in _REGISTERED:
         return _REGISTERED[name]
-    if name not in TASK_VERSIONS:
-        known = (*TASK_VERSIONS, *_REGISTERED)
+    if name not in ALL_TASKS:
+        known = (*ALL_TASKS, *_REGISTERED)
         raise ValueError(
             f"task must be one of {', '.join(known)}, got {task!r}{suggestion(task, known)}"
         )
     return importlib.import_module(f"{__name__}.{name.lower()}").TASK
 
 
-def register_task(task: Task, env_id: str) -> None:
+def register_task(task: Task, env_id: str, *, reward_threshold: float | None = None) -> None:
     """Make a task of your own known by its name, and to ``gymnasium.make`` and ``make_vec`` by an id.
 
     Parameters
@@ -41,16 +41,18 @@ def register_task(task: Task, env_id: str) -> None:
     task : Task
     env_id : str
         As "Mine/Zigzag-v0".
+    reward_threshold : float, optional
+        The mean return from which the task counts as solved.
 
     Raises
     ------
     ValueError
         If another task has that name.
     """
-    if task.name in TASK_VERSIONS or _REGISTERED.get(task.name, task) is not task:
+    if task.name in ALL_TASKS or _REGISTERED.get(task.name, task) is not task:
         raise ValueError(f"name must be a task's own, got {task.name!r}, which there is already")
     _REGISTERED[task.name] = task
-    register_id(env_id, task.name, reward_threshold=task.reward_threshold)
+    register_id(env_id, task.name, reward_threshold=reward_threshold)
 
 
 __all__ = [

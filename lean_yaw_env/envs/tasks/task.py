@@ -90,8 +90,6 @@ class Task:
     pumping : float
         Episodes start in the gait driven by this offset, away from the stance foot; 0 is the gait that the slope drives.
     headline : the metric, or "return", by which agents are compared: it must say enough without a look at survival
-    reward_threshold : float, optional
-        The return of an episode from which on the task counts as solved.
 
     Raises
     ------
@@ -123,7 +121,6 @@ class Task:
     push_level: float = 0.0
     pumping: float = 0.0
     headline: str = "return"
-    reward_threshold: float | None = None
 
     def __post_init__(self) -> None:
         common = {field.name for field in WALKER_FIELDS}
@@ -132,7 +129,9 @@ class Task:
             raise ValueError(
                 f"fields must not have names of the walker's record, got {', '.join(sorted(common & own))}"
             )
-        named = [name for metric in self.metrics.values() for name in (metric.field, metric.divisor)]
+        named = [
+            name for metric in self.metrics.values() for name in (metric.field, metric.divisor)
+        ]
         named += [name for command in self.commands.values() for name in command.fields]
         named += [self.heading_field, *(self.goal_fields or ())]
         for name in named:
@@ -166,7 +165,9 @@ class Task:
         tables = differentiation_tables(self.fields)
         return self._compiled(differentiate, ("read_observation",), **tables)
 
-    def measure(self, walkers: Records, tasks: Records, undefined: float = 0.0) -> dict[str, Vector]:
+    def measure(
+        self, walkers: Records, tasks: Records, undefined: float = 0.0
+    ) -> dict[str, Vector]:
         """The metrics of walkers' records and the task's, each (n,); quotients without a divisor are ``undefined``."""
         found: dict[str, Vector] = {}
         for key, metric in self.metrics.items():
@@ -179,9 +180,7 @@ class Task:
                 found[key] = values
         return found
 
-    def _compiled(
-        self, template: Callable[..., Any], parts: tuple[str, ...], **more: Any
-    ) -> Any:
+    def _compiled(self, template: Callable[..., Any], parts: tuple[str, ...], **more: Any) -> Any:
         """The template with this task's formulas and tables; tasks that have the same ones share what is compiled."""
         formulas = {
             "TASK_START": self.start,
@@ -195,7 +194,11 @@ class Task:
             "SCALES": (*COMMON_SCALES, *(feature.scale for feature in self.observed)),
             "ODD": (*COMMON_ODD, *(feature.is_odd for feature in self.observed)),
         }
-        contents = ([each[:5] for each in self.fields], tables, [info[:2] for info in infos_of(self)])
+        contents = (
+            [each[:5] for each in self.fields],
+            tables,
+            [info[:2] for info in infos_of(self)],
+        )
         key = (template, *formulas.values(), repr(contents))
         if key not in _COMPILED:
             names = [f"{each.__module__}.{each.__qualname__}" for each in formulas.values()]

@@ -116,7 +116,7 @@ TASK = Task(
     },
     summary=f"Walk to one place after another: each {NEAREST:g} to {FARTHEST:g} leg lengths from where the walker is when it is set, at any "
     f"bearing, reached within {RADIUS}. The slope turns with the walker, so that every heading is like any other. With the largest offset "
-    "held, 0.05, the walker turns on a radius of 8.3 at the inter-leg angle of 0.3, of 39 at 0.15, 4.3 at 0.36 and 2.5 at 0.39; at 0.42 it "
+    "held, 0.05, the walker turns on a radius of 8.2 at the inter-leg angle of 0.3, of 38 at 0.15, 4.1 at 0.36 and 2.3 at 0.39; at 0.42 it "
     "trips.",
     reward_text=f"{WALKING_RATE} + {APPROACH:g} (speed of approach to the goal) - {EFFORT_RATE} effort",
     history=("0: the first.",),

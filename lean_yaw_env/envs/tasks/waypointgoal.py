@@ -1,4 +1,4 @@
-"""WaypointGoal: walk to one place, paid for reaching it alone. The task behind ``WaypointGoalEnv``."""
+"""WaypointGoal: walk to one place, paid for reaching it alone. ``goal_env`` shows it to goal-conditioned learners."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from lean_yaw_env.envs.formulas import mean_heading, place
 from lean_yaw_env.envs.state import Field
-from lean_yaw_env.envs.tasks.task import Feature, Metric
+from lean_yaw_env.envs.tasks.task import Metric
 from lean_yaw_env.envs.tasks.waypoint import RADIUS, goal_distance
 from lean_yaw_env.envs.tasks.waypoint import TASK as WAYPOINT
 from lean_yaw_env.kernel.compilation import formula
@@ -29,13 +29,9 @@ def update(walker: Any, task: Any) -> bool:
 
 @formula
 def refresh(walker: Any, task: Any) -> None:
-    task.own_x, task.own_z = place(walker)
-
-
-@formula
-def features(walker: Any, task: Any) -> Any:
     heading = mean_heading(walker)
-    return np.cos(heading), np.sin(heading)
+    task.own_x, task.own_z = place(walker)
+    task.heading_cosine, task.heading_sine = np.cos(heading), np.sin(heading)
 
 
 TASK = replace(
@@ -46,18 +42,15 @@ TASK = replace(
         Field("goal_z", "leg lengths", "to the right", is_odd=True),
         Field("own_x", "leg lengths", "where the walker is, downhill"),
         Field("own_z", "leg lengths", "the same to the right", is_odd=True),
+        Field("heading_cosine", "", "of the mean heading of the last two footprints"),
+        Field("heading_sine", "", "of the same", is_odd=True),
         Field("reached", "", "whether the goal is reached", "i8"),
     ),
     reward=reward,
     update=update,
     refresh=refresh,
-    features=features,
-    observed=(
-        Feature("heading_cosine", 1.0, "", "of the mean heading of the last two footprints"),
-        Feature("heading_sine", 1.0, "", "of the same", is_odd=True),
-    ),
     metrics={"is_success": Metric("reached", None, "1 once the goal is reached", "higher", True)},
-    summary="Walk to one place, as far and at any bearing as in Waypoint; observations are goal-conditioned.",
+    summary="Walk to one place, as far and at any bearing as in Waypoint.",
     reward_text=f"none, but 1 for the step that comes within {RADIUS} of the goal",
     ends="the goal reached",
     horizon=150.0,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,14 +23,14 @@ from torch.utils.tensorboard import SummaryWriter
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
 from lean_yaw_env.validation import require_number
 
-from ...policies.storage import task_of
-from ...seeds import training_seed
-from ..learner import LearnerSettings, optimizer_arrays, restore_optimizer
-from ..recorder import Arrays, EndedEpisode, Recorder, restoring, under
-from .networks import Critic, layer_weights, make_policy
-from .returns import Window, time_discounted_returns
-from .walkers import DifferentiableWalkers, Walked
+from ..policies.storage import task_of
+from ..seeds import training_seed
+from .differentiable import DifferentiableWalkers, Walked, Window, time_discounted_returns
+from .learner import LearnerSettings, optimizer_arrays, restore_optimizer
+from .recorder import Arrays, EndedEpisode, Recorder, restoring, under
 
+_LAST_LAYER = 0.01
+"""Scale of a policy's last layer at first: it begins near the gait's own command."""
 _BETAS = (0.7, 0.95)
 """Adam's, as Xu et al. (2022) have them: exact gradients need less averaging than sampled ones."""
 
@@ -244,3 +245,47 @@ def _ended(walked: Walked, steps: int) -> list[EndedEpisode]:
         )
         for i in torch.nonzero(walked.terminated | walked.truncated).flatten().tolist()
     ]
+
+
+def perceptron(
+    inputs: int, hidden: Sequence[int], outputs: int, last: float, generator: torch.Generator
+) -> nn.Sequential:
+    """A perceptron with tanh between its layers, begun orthogonally, the last layer scaled by ``last``."""
+    sizes = [inputs, *hidden, outputs]
+    layers: list[nn.Module] = []
+    for k in range(len(sizes) - 1):
+        is_last = k == len(sizes) - 2
+        layer = nn.Linear(sizes[k], sizes[k + 1])
+        gain = last if is_last else math.sqrt(2.0)
+        nn.init.orthogonal_(layer.weight, gain, generator=generator)
+        nn.init.zeros_(layer.bias)
+        layers += [layer] if is_last else [layer, nn.Tanh()]
+    return nn.Sequential(*layers)
+
+
+def make_policy(
+    features: int, actions: int, hidden: Sequence[int], generator: torch.Generator
+) -> nn.Sequential:
+    """A network from observations to actions, which are clipped by who takes them."""
+    return perceptron(features, hidden, actions, _LAST_LAYER, generator)
+
+
+class Critic(nn.Module):
+    """What is still to be earned from an observation (..., features), in units of a rate of one over the time constant."""
+
+    def __init__(self, features: int, hidden: Sequence[int], generator: torch.Generator) -> None:
+        super().__init__()
+        self.network = perceptron(features, hidden, 1, 1.0, generator)
+
+    def forward(self, observations: Tensor) -> Tensor:
+        return self.network(observations).squeeze(-1)
+
+
+def layer_weights(policy: nn.Sequential) -> dict[str, NDArray[np.float32]]:
+    """A policy's weights by the names of ``agents.policies.Policy``."""
+    layers = [layer for layer in policy if isinstance(layer, nn.Linear)]
+    return {
+        f"layers.{k}.{name}": tensor.detach().numpy().copy()
+        for k, layer in enumerate(layers)
+        for name, tensor in (("weight", layer.weight), ("bias", layer.bias))
+    }

@@ -1,1 +1,0 @@
-"""Policy optimisation through the exact derivatives of walking steps: short-horizon analytic policy gradients."""
