@@ -129,7 +129,7 @@ def test_every_registered_controller_can_be_made_for_heading():
 
 
 def test_bad_names_shapes_gains_and_tasks_are_refused_by_name():
-    with pytest.raises(ValueError, match=r"agents must be among random, fixed, .*ppo"):
+    with pytest.raises(ValueError, match=r"agent must be one of random, fixed, .*ppo"):
         make_agent("sac!", AgentRequest(ID, EnvOptions()))
     with pytest.raises(ValueError, match=r"observation must have shape \(\.\.\., 7\)"):
         HeadingFeedback().predict(np.zeros(6))

@@ -12,7 +12,7 @@ from agents.controllers.mpc import MpcController
 from agents.controllers.mpc_rollouts import Rollouts
 from agents.controllers.mpc_settings import MpcSettings, PlanSpread
 from agents.controllers.simple import FixedController
-from agents.evaluation.footprints import record_episode
+from agents.evaluation.footprint_pictures import record_episode
 from agents.evaluation.scoring import run_seeds
 from agents.seeds import TUNING_SEEDS
 from agents.settings import tuned
@@ -113,7 +113,9 @@ def test_the_base_acts_where_no_plan_is_better_by_the_margin():
     env = started("Slalom")
     # no plan is better by more than a walker earns
     actions = decide(env, "Slalom", replace(TINY, margin=1e6))
-    np.testing.assert_array_equal(actions, FixedController().predict(env.simulation.observations)[0])
+    np.testing.assert_array_equal(
+        actions, FixedController().predict(env.simulation.observations)[0]
+    )
     assert np.all(decide(env, "Slalom", replace(TINY, margin=0.0)) != actions)
 
 

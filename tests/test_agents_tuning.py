@@ -351,7 +351,7 @@ def test_what_no_tuning_left_is_not_shipped(kept, tmp_path, record):
     ("arguments", "message"),
     [
         (["ppo", "Fly"], "task must be one of"),
-        (["lqr", "WaypointGoal"], "task must be one of"),
+        (["lqr", "WaypointGoal"], "task must be one of Heading"),
         (["dqn", "Walk"], "agent must be one of"),
         (["feedback", "Walk"], "task must be one of Heading"),
         (["ppo", "Walk", "--steps", "0"], "steps must be from"),

@@ -85,7 +85,9 @@ class TaskInterface:
     def __init__(self, task: Task, options: EnvOptions, commands: Mapping[str, float]) -> None:
         self._task, self._options = task, options
         self._coordinates = {"previous_heading": _PREVIOUS_HEADING, **EXTRAS.get(task.name, {})}
-        self.remembered: Mapping[str, Motion] = {name: each.motion for name, each in self._coordinates.items()}
+        self.remembered: Mapping[str, Motion] = {
+            name: each.motion for name, each in self._coordinates.items()
+        }
         sees_heading = task.heading_field is not None or task.goal_fields is not None
         self.headings: tuple[str, ...] = () if sees_heading else ("heading", "previous_heading")
         self.scales = np.array(

@@ -59,9 +59,9 @@ def space_of(agent: str, task: str, horizon: float | None = None) -> Space:
         If there is no such task, or nothing to tune of the agent at it.
     """
     require_choice("agent", agent, ("feedback", "lqr", "mpc", *_LEARNERS))
-    require_choice(
-        "task", task, [each for each in agent_entry(agent).tasks if each in TASK_VERSIONS]
-    )
+    own = [name for tuned_agent, name in RANGES if tuned_agent == agent]
+    others = [each for each in agent_entry(agent).tasks if each in TASK_VERSIONS]
+    require_choice("task", task, own or others)
     if agent in _LEARNERS:
         return _learner_space(agent, task)
     if agent == "mpc":
