@@ -8,7 +8,7 @@
 from .agent import Agent
 from .controllers.simple import FixedController, HeadingFeedback, HeadingGains, RandomController
 from .policies.policy import Policy, PolicyCard
-from .policies.storage import PolicyFileError, load, save, shipped_seeds
+from .policies.policy_files import PolicyFileError, load, save, shipped_seeds
 from .registry import AGENTS, AgentRequest, make_agent
 
 __all__ = [

@@ -111,7 +111,7 @@ def evaluate(
     from .evaluation.comparison import compared_rows, samples_by_task
     from .evaluation.leaderboard import make_leaderboard, save_footprints
     from .evaluation.plan import Evaluation
-    from .evaluation.tables import show
+    from .evaluation.row_tables import show
 
     given = names_in([*(agents or []), *(more_agents or [])])
     names = [] if ALL in given else given

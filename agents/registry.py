@@ -18,7 +18,7 @@ from .agent import Agent
 from .controllers.guidance import guided
 from .controllers.mpc import MpcController
 from .controllers.simple import FixedController, HeadingFeedback, RandomController
-from .policies.storage import (
+from .policies.policy_files import (
     CARD_FILE,
     DEFAULT_ALGORITHM,
     load,

@@ -7,9 +7,9 @@ from pathlib import Path
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.files import read_json, write_json
 
+from .learning.runs import EVALUATION_FILE
 from .learning.series import is_series, runs_of
-from .learning.training import EVALUATION_FILE
-from .policies.storage import load, save, shipping_folder
+from .policies.policy_files import load, save, shipping_folder
 from .settings import all_settings, keep_settings, with_values
 from .tuning.spaces import space_of
 

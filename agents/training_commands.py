@@ -73,9 +73,9 @@ def train(
 
     With --seeds, also draw all learning curves in one picture and print the spread of the results.
     """
-    from .evaluation.tables import show
+    from .evaluation.row_tables import show
+    from .learning.runs import run
     from .learning.series import RunError, is_series
-    from .learning.training import run
 
     console = Console()
     given = {
@@ -113,8 +113,8 @@ def _training_place(
     resume: bool,
 ) -> Path:
     """The folder of the run or series to train, made if it is a new one; ``ValueError`` for choices that go ill together."""
+    from .learning.runs import Training, new_run
     from .learning.series import new_series, parse_seeds, resumed
-    from .learning.training import Training, new_run
 
     if resume:
         return resumed(task, out, folder, chosen if seeds is None else {**chosen, "seeds": seeds})

@@ -25,7 +25,7 @@ from agents.learning.algorithms import settings_for, train
 from agents.learning.recorder import Arrays, read_checkpoint
 from agents.observations import ObservationLayout
 from agents.policies.policy import Policy, PolicyCard
-from agents.policies.storage import save, task_of
+from agents.policies.policy_files import save, task_of
 from agents.registry import env_id_of
 from benchmarks.machine import machine
 from lean_yaw_env.envs.options import EnvOptions

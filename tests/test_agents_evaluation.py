@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 from agents import FixedController, HeadingFeedback, RandomController
 from agents.command_line import app
 from agents.evaluation import scoring
-from agents.evaluation.results import Results, Row, summary
+from agents.evaluation.episodes import Results, Row, summary
+from agents.evaluation.row_tables import results_table, rows_to_csv, rows_to_json
 from agents.evaluation.scoring import evaluate, run_episodes
-from agents.evaluation.tables import results_table, rows_to_csv, rows_to_json
 from agents.seeds import (
     EVALUATION_SEEDS,
     MOST_EPISODES,

@@ -11,12 +11,12 @@ import torch
 
 import agents
 from agents.evaluation.scoring import run_episodes
-from agents.learning import sb3
+from agents.learning import stable_baselines
 from agents.learning.algorithms import Trained, settings_for, train
 from agents.learning.experience import TimeDiscountedHindsight
 from agents.learning.her import HERSettings
 from agents.learning.recorder import read_checkpoint
-from agents.learning.training import Training, make_run, run
+from agents.learning.runs import Training, make_run, run
 from agents.registry import AgentRequest, env_id_of, make_agent, names_for
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.sb3 import WalkerVecEnv
@@ -64,7 +64,7 @@ def test_an_interrupted_training_resumes_bit_for_bit(
 ) -> None:
     whole = train("her", GOAL_ENV_ID, TINY, seed=3, options=SHORT, progress=False)
     checkpoint = tmp_path / "checkpoint.safetensors"
-    original = sb3._Callback._on_step
+    original = stable_baselines._Callback._on_step
 
     def begin() -> Trained:
         return train(
@@ -72,15 +72,15 @@ def test_an_interrupted_training_resumes_bit_for_bit(
             progress=False,
         )  # fmt: skip
 
-    def interrupted(self: sb3._Callback) -> bool:
+    def interrupted(self: stable_baselines._Callback) -> bool:
         if self.num_timesteps > moment:
             raise Interruption
         return original(self)
 
-    monkeypatch.setattr(sb3._Callback, "_on_step", interrupted)
+    monkeypatch.setattr(stable_baselines._Callback, "_on_step", interrupted)
     with pytest.raises(Interruption):
         begin()
-    monkeypatch.setattr(sb3._Callback, "_on_step", original)
+    monkeypatch.setattr(stable_baselines._Callback, "_on_step", original)
     assert int(read_checkpoint(checkpoint)["count.steps"]) == moment
     np.random.seed(99)  # noqa: NPY002 - the resumed training must not depend on it
     torch.manual_seed(99)

@@ -20,7 +20,8 @@ from agents.evaluation.comparison import (
     samples_of,
     task_rows,
 )
-from agents.evaluation.footprints import record_episode
+from agents.evaluation.episodes import RETURN, SURVIVAL, Episodes, Results, is_share
+from agents.evaluation.footprint_pictures import record_episode
 from agents.evaluation.leaderboard import (
     Circumstances,
     leaderboard_page,
@@ -29,7 +30,6 @@ from agents.evaluation.leaderboard import (
     make_leaderboard,
 )
 from agents.evaluation.plan import Candidate, Evaluation, run_all
-from agents.evaluation.results import RETURN, SURVIVAL, Episodes, Results, is_share
 from agents.evaluation.scoring import run_episodes
 from agents.registry import (
     AGENTS,

@@ -17,7 +17,7 @@ import agents
 from agents.learning.algorithms import train
 from agents.learning.ppo import PPOSettings
 from agents.observations import ObservationLayout
-from agents.policies import storage
+from agents.policies import policy_files
 from agents.policies.policy import Policy, PolicyCard
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.parameters import WalkerParameters
@@ -64,7 +64,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def change(folder: Path, **values) -> None:
-    path = folder / storage.CARD_FILE
+    path = folder / policy_files.CARD_FILE
     path.write_text(json.dumps(json.loads(path.read_text()) | values))
 
 
@@ -118,8 +118,8 @@ def test_what_is_saved_is_what_is_loaded(tmp_path, options):
     observation = np.random.default_rng(2).normal(size=(3, len(layout.names)))
     assert np.array_equal(loaded.predict(observation)[0], saved.predict(observation)[0])
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        storage.CARD_FILE,
-        storage.WEIGHTS_FILE,
+        policy_files.CARD_FILE,
+        policy_files.WEIGHTS_FILE,
     ]
 
 
@@ -130,7 +130,7 @@ def test_a_policy_file_that_holds_pickled_code_is_refused_and_not_run(folder, tm
         def __reduce__(self):
             return (Path.touch, (ran,))
 
-    for name in (storage.WEIGHTS_FILE, storage.CARD_FILE):
+    for name in (policy_files.WEIGHTS_FILE, policy_files.CARD_FILE):
         (folder / name).write_bytes(pickle.dumps(Bomb()))
         with pytest.raises(agents.PolicyFileError):
             agents.load(folder)
@@ -151,7 +151,7 @@ def test_another_environment_or_version_is_refused_with_what_to_do(folder):
 
 
 def test_another_observation_is_refused(folder):
-    observation = json.loads((folder / storage.CARD_FILE).read_text())["observation"]
+    observation = json.loads((folder / policy_files.CARD_FILE).read_text())["observation"]
     observation["scales"][0] = 1.0
     change(folder, observation=observation)
     with pytest.raises(agents.PolicyFileError, match="trained on other observations"):
@@ -182,14 +182,14 @@ def test_a_damaged_card_is_refused_by_what_is_wrong(folder, values, message):
 
 
 def test_damaged_or_missing_files_are_refused(folder):
-    weights_file = folder / storage.WEIGHTS_FILE
+    weights_file = folder / policy_files.WEIGHTS_FILE
     weights_file.write_bytes(weights_file.read_bytes()[:-1])
     with pytest.raises(agents.PolicyFileError, match="is not the file that"):
         agents.load(folder)
     weights_file.unlink()
     with pytest.raises(agents.PolicyFileError, match="cannot be read"):
         agents.load(folder)
-    (folder / storage.CARD_FILE).write_text("{")
+    (folder / policy_files.CARD_FILE).write_text("{")
     with pytest.raises(agents.PolicyFileError, match="is not JSON"):
         agents.load(folder)
     with pytest.raises(agents.PolicyFileError, match="there is no file"):
@@ -213,11 +213,11 @@ def test_weights_that_are_no_network_are_refused():
 
 
 def test_agents_of_the_package_are_found_by_id_algorithm_and_seed(tmp_path, monkeypatch):
-    monkeypatch.setattr(storage, "SHIPPED", tmp_path)
+    monkeypatch.setattr(policy_files, "SHIPPED", tmp_path)
     for algorithm, seed in [("ppo", 3), ("ppo", 11), ("sac", 2)]:
-        folder = storage.shipping_folder(ID, algorithm, seed)
+        folder = policy_files.shipping_folder(ID, algorithm, seed)
         agents.save(Policy(card(algorithm=algorithm, seed=seed), weights(seed)), folder)
-    assert (tmp_path / "Heading-v0" / "sac" / "seed2" / storage.CARD_FILE).exists()
+    assert (tmp_path / "Heading-v0" / "sac" / "seed2" / policy_files.CARD_FILE).exists()
     assert agents.shipped_seeds(ID, "ppo") == [3, 11]
     assert agents.shipped_seeds(ID, "sac") == [2]
     assert agents.shipped_seeds("LeanYaw/Walk-v0", "ppo") == []

@@ -9,13 +9,13 @@ import torch
 from gymnasium import spaces
 
 from agents import load, save
-from agents.learning import sb3
+from agents.learning import stable_baselines
 from agents.learning.algorithms import ALGORITHMS, settings_for, settings_from_plain, train
 from agents.learning.experience import TimeDiscountedReplay
 from agents.learning.learner import settings_to_plain
 from agents.learning.recorder import CheckpointError, read_checkpoint
+from agents.learning.runs import Training, make_run, run
 from agents.learning.sac import SACSettings
-from agents.learning.training import Training, make_run, run
 from lean_yaw_env.envs.options import EnvOptions
 
 ID = "LeanYaw/Heading-v0"
@@ -70,17 +70,17 @@ def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, monkeypatch, mome
     whole = train("sac", ID, TINY, seed=3, options=SHORT, progress=False)
     checkpoint = tmp_path / "checkpoint.safetensors"
     arguments = {"seed": 3, "options": SHORT, "checkpoint": checkpoint, "checkpoint_seconds": 0.0, "progress": False}  # fmt: skip
-    original = sb3._Callback._on_step
+    original = stable_baselines._Callback._on_step
 
     def interrupted(self) -> bool:
         if self.num_timesteps > moment:
             raise Interruption
         return original(self)
 
-    monkeypatch.setattr(sb3._Callback, "_on_step", interrupted)
+    monkeypatch.setattr(stable_baselines._Callback, "_on_step", interrupted)
     with pytest.raises(Interruption):
         train("sac", ID, TINY, **arguments)
-    monkeypatch.setattr(sb3._Callback, "_on_step", original)
+    monkeypatch.setattr(stable_baselines._Callback, "_on_step", original)
     assert int(read_checkpoint(checkpoint)["count.steps"]) == moment
     np.random.seed(99)  # noqa: NPY002 - the resumed training must not depend on it
     torch.manual_seed(99)

@@ -15,16 +15,16 @@ from typer.testing import CliRunner
 import train
 from agents import Policy, load, save
 from agents.command_line import app as agents_app
-from agents.evaluation.tables import rows_to_plain
-from agents.learning import sb3
+from agents.evaluation.row_tables import rows_to_plain
+from agents.learning import stable_baselines
 from agents.learning.algorithms import ALGORITHMS, settings_for
 from agents.learning.algorithms import train as train_agent
 from agents.learning.experience import TimeDiscountedBuffer
 from agents.learning.ppo import PPOSettings
 from agents.learning.recorder import CheckpointError, read_checkpoint, write_checkpoint
+from agents.learning.runs import Training, new_run, read_run, run
 from agents.learning.series import resumed
-from agents.learning.training import Training, new_run, read_run, run
-from agents.policies import storage
+from agents.policies import policy_files
 from agents.settings import all_settings
 from agents.shipping import ship
 from lean_yaw_env.envs.options import EnvOptions
@@ -89,17 +89,17 @@ def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, monkeypatch):
     whole = train_agent("ppo", ID, TINY, seed=3, options=SHORT, progress=False)
     checkpoint = tmp_path / "checkpoint.safetensors"
     arguments = {"seed": 3, "options": SHORT, "checkpoint": checkpoint, "checkpoint_seconds": 0.0, "progress": False}  # fmt: skip
-    original = sb3._Callback._on_step
+    original = stable_baselines._Callback._on_step
 
     def interrupted(self) -> bool:
         if self.num_timesteps > 800:  # in the midst of collecting experience
             raise Interruption
         return original(self)
 
-    monkeypatch.setattr(sb3._Callback, "_on_step", interrupted)
+    monkeypatch.setattr(stable_baselines._Callback, "_on_step", interrupted)
     with pytest.raises(Interruption):
         train_agent("ppo", ID, TINY, **arguments)
-    monkeypatch.setattr(sb3._Callback, "_on_step", original)
+    monkeypatch.setattr(stable_baselines._Callback, "_on_step", original)
     assert int(read_checkpoint(checkpoint)["count.steps"]) == 768  # the last update before
     np.random.seed(99)  # noqa: NPY002 - the resumed training must not depend on it
     torch.manual_seed(99)
@@ -202,7 +202,7 @@ def test_a_run_leaves_agent_statistics_settings_pictures_and_judgement(tmp_path)
 
 
 def test_finished_runs_are_shipped_and_loaded_by_id_and_others_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(storage, "SHIPPED", tmp_path / "trained")
+    monkeypatch.setattr(policy_files, "SHIPPED", tmp_path / "trained")
     folder = new_run(tiny_training(options=EnvOptions(), seed=3), tmp_path)
     with pytest.raises(ValueError, match=r"no policy can be loaded"):
         ship(folder)

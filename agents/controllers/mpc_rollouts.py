@@ -111,12 +111,14 @@ class Rollouts:
             else:
                 copies.actions[:] = self._base.predict(copies.observations)[0]
             copies.step_many(~account.live, 0, copies.n)
-            self._settle(copies, account, step, step == last)
+            self._update_account(copies, account, step, step == last)
             if not account.live.any():
                 break
         return account.worth.reshape(n, m, draws).mean(axis=-1)
 
-    def _settle(self, copies: Simulation, account: _Account, step: int, is_last: bool) -> None:
+    def _update_account(
+        self, copies: Simulation, account: _Account, step: int, is_last: bool
+    ) -> None:
         """Take a step into the account; one that the solver gave up counts as a fall."""
         settings, walkers = self._settings, copies.walkers
         falls = account.live & copies.terminated

@@ -12,8 +12,8 @@ import numpy as np
 from lean_yaw_env.envs.tasks import task_named
 
 from ..registry import agent_entry
+from .episodes import RETURN, SURVIVAL, Results, Row, is_share, metric_row
 from .intervals import Estimate, Resampled, resample
-from .results import RETURN, SURVIVAL, Results, Row, is_share, metric_row
 
 Verdict = Literal["better", "worse", "tie", "mixed"]
 _VERDICTS: dict[int, Verdict] = {1: "better", -1: "worse", 0: "tie"}

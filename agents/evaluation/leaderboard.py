@@ -24,12 +24,12 @@ from .comparison import (
     expectations_of,
     samples_by_task,
 )
-from .footprints import save_agents_footprints
+from .episodes import RETURN, SURVIVAL, Row, is_share, metric_row
+from .footprint_pictures import save_agents_footprints
 from .intervals import CONFIDENCE, RESAMPLES, Estimate
 from .plan import Candidate, CandidateResults, Evaluation
 from .plots import save_leaderboard_plot, save_push_levels_plot
-from .results import RETURN, SURVIVAL, Row, is_share, metric_row
-from .tables import estimate, number, rows_to_csv
+from .row_tables import estimate, number, rows_to_csv
 
 PAGE_FILE = "leaderboard.md"
 NUMBERS_FILE = "leaderboard.csv"

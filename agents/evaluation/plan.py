@@ -26,7 +26,7 @@ from lean_yaw_env.files import written_whole
 from lean_yaw_env.validation import require_count
 
 from ..policies.policy import package_versions
-from ..policies.storage import CARD_FILE, WEIGHTS_FILE, options_to_plain
+from ..policies.policy_files import CARD_FILE, WEIGHTS_FILE, options_to_plain
 from ..registry import (
     AgentRequest,
     agent_entry,
@@ -36,7 +36,7 @@ from ..registry import (
     policy_folders,
 )
 from ..seeds import MOST_EPISODES, evaluation_seed
-from .results import Episodes, Results
+from .episodes import Episodes, Results
 from .scoring import Progress, run_seeds
 
 COSTLY_EPISODES = 40

@@ -14,8 +14,8 @@ from lean_yaw_env.rendering.figures import new_figure, save_figure
 
 from ..registry import agent_colour
 from .comparison import direction
-from .results import Row, is_share
-from .tables import estimate
+from .episodes import Row, is_share
+from .row_tables import estimate
 
 _COLUMNS = 4
 _INK = "0.2"

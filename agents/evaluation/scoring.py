@@ -17,7 +17,7 @@ from lean_yaw_env.validation import require_count
 
 from ..agent import Agent, State, attach
 from ..seeds import MOST_EPISODES, evaluation_seed
-from .results import RETURN, SPEED, Episodes, Results, Row, summary
+from .episodes import RETURN, SPEED, Episodes, Results, Row, summary
 
 _CHUNK = 1024  # walkers stepped together
 

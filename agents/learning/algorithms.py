@@ -12,7 +12,7 @@ from lean_yaw_env.validation import require_choice
 
 from ..observations import ObservationLayout
 from ..policies.policy import Policy, PolicyCard, package_versions
-from ..policies.storage import task_of
+from ..policies.policy_files import task_of
 from ..settings import tuned
 from .apg import GradientLearner, GradientSettings
 from .her import HERLearner, HERSettings

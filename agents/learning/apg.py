@@ -23,7 +23,7 @@ from torch.utils.tensorboard import SummaryWriter
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
 from lean_yaw_env.validation import require_number
 
-from ..policies.storage import task_of
+from ..policies.policy_files import task_of
 from ..seeds import training_seed
 from .differentiable import DifferentiableWalkers, Walked, Window, time_discounted_returns
 from .learner import LearnerSettings, optimizer_arrays, restore_optimizer

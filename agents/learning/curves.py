@@ -14,7 +14,7 @@ from lean_yaw_env.parameters import Vector
 from lean_yaw_env.rendering.figures import new_figure, save_figure
 from lean_yaw_env.rendering.palette import LIGHT_GREY, VERMILION, unit_colour
 
-from ..evaluation.results import RETURN, Row
+from ..evaluation.episodes import RETURN, Row
 from ..registry import agent_colour
 from .recorder import TrainingLog
 

@@ -104,7 +104,7 @@ class TimeDiscountedReplay(ReplayBuffer):
     ) -> None:
         """Take a step of all walkers."""
         self.durations[self.pos][np.asarray(done, dtype=np.bool_)] = self.typical_duration
-        super().add(obs, next_obs, action, reward, done, infos)
+        super().add(obs, next_obs, action, reward, done, infos)  # pyright: ignore[reportAttributeAccessIssue]
 
     def captured(self) -> Arrays:
         """The experience there is, and where the next goes."""

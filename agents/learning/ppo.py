@@ -18,7 +18,7 @@ from lean_yaw_env.validation import require_number
 from ..seeds import training_seed
 from .experience import TimeDiscountedBuffer
 from .learner import LearnerSettings, float_array
-from .sb3 import Falling, StableBaselinesLearner, training_environment
+from .stable_baselines import Falling, StableBaselinesLearner, training_environment
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from ..seeds import training_seed
 from .experience import TimeDiscountedReplay
 from .learner import GAIT_STEP, LearnerSettings, float_array
 from .recorder import Arrays, restoring, under
-from .sb3 import (
+from .stable_baselines import (
     Falling,
     StableBaselinesLearner,
     captured_observations,

@@ -27,7 +27,7 @@ from lean_yaw_env.validation import require_count
 from ..registry import env_id_of
 from ..seeds import TRAINING_SEEDS
 from .curves import save_seeds_curves
-from .training import (
+from .runs import (
     EVALUATION_FILE,
     RUN_FILE,
     Training,

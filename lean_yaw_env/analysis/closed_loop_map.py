@@ -38,7 +38,7 @@ from lean_yaw_env.analysis.step_derivatives import BY_BODY, BY_COMMAND, differen
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.jacobian import OUTPUTS
 from lean_yaw_env.kernel.records import STEPPED, Command, Outcome
-from lean_yaw_env.parameters import MIRROR, STATE_FIELDS, STATE_SIZE, Foot, Vector, require_state
+from lean_yaw_env.parameters import STATE_FIELDS, STATE_SIZE, Foot, Vector, require_state
 from lean_yaw_env.validation import require_array, require_choice, require_count
 from lean_yaw_env.walker import Walker
 

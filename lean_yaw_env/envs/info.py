@@ -19,7 +19,6 @@ from lean_yaw_env.kernel.compilation import written_formula
 from lean_yaw_env.parameters import STATE_FIELDS, STATE_SIZE, Vector
 from lean_yaw_env.walker import FALL_OF_STATUS
 
-
 Flags = NDArray[np.bool_]
 
 

@@ -13,7 +13,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from .results import RETURN, Row, is_share
+from .episodes import RETURN, Row, is_share
 
 _WIDTH = 5  # agents in a table: so many fit a terminal of 80 columns
 

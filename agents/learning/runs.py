@@ -15,12 +15,12 @@ from lean_yaw_env.files import read_json, write_json
 from lean_yaw_env.validation import require_count
 
 from ..agent import Agent
-from ..evaluation.footprints import save_agents_footprints
-from ..evaluation.results import Row
+from ..evaluation.episodes import Row
+from ..evaluation.footprint_pictures import save_agents_footprints
+from ..evaluation.row_tables import rows_to_plain
 from ..evaluation.scoring import evaluate
-from ..evaluation.tables import rows_to_plain
 from ..policies.policy import Policy, package_versions
-from ..policies.storage import CARD_FILE, options_from_plain, options_to_plain, save, task_of
+from ..policies.policy_files import CARD_FILE, options_from_plain, options_to_plain, save, task_of
 from ..registry import AgentRequest, env_id_of, make_all
 from ..seeds import MOST_EPISODES, evaluation_seed, training_seed
 from .algorithms import settings_for, settings_from_plain, train

@@ -19,7 +19,7 @@ from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.sb3 import WalkerVecEnv
 
 from ..policies.policy import NORMALISATION_FLOOR, NORMALISED_LIMIT
-from ..policies.storage import task_of
+from ..policies.policy_files import task_of
 from .experience import named_arrays
 from .learner import LearnerSettings, float_array, optimizer_arrays, restore_optimizer
 from .recorder import Arrays, EndedEpisode, Recorder, restoring, under
