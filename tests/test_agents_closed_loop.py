@@ -30,7 +30,7 @@ from agents.observations import ObservationLayout
 from lean_yaw_env import Walker, WalkerParameters
 from lean_yaw_env.analysis import find_limit_cycle, largest_pushes, modes
 from lean_yaw_env.analysis.many_walks import walk_many
-from lean_yaw_env.analysis.stride import differentiate_step
+from lean_yaw_env.analysis.step_derivatives import differentiate_step
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.kernel.records import Command

@@ -20,6 +20,7 @@ from lean_yaw_env.analysis import (
     largest_pushes,
     modes,
     stability_map,
+    step_derivatives,
 )
 from lean_yaw_env.analysis.attraction import push_ways
 from lean_yaw_env.analysis.many_walks import walk_many
@@ -229,9 +230,8 @@ def test_a_solvers_failure_is_raised_and_no_fall(monkeypatch) -> None:
 
 
 def test_a_failure_in_the_linear_step_is_raised_and_no_fall(monkeypatch) -> None:
-    monkeypatch.setattr(
-        "lean_yaw_env.analysis.stride.step_jacobian", lambda *arguments: (FAILED, None, None)
-    )
+    failed = FAILED, np.zeros(10), np.zeros((10, 8))
+    monkeypatch.setattr(step_derivatives, "step_jacobian", lambda *arguments: failed)
     with pytest.raises(SolverError, match="did not converge"):
         FEEDBACK.linearise(FEEDBACK.start)
 

@@ -16,8 +16,6 @@ from lean_yaw_env.analysis import (
     floor_demand,
     modes,
     section_map_of,
-    stride_jacobian,
-    stride_map,
 )
 from lean_yaw_env.analysis.fixed_point import follow_fixed_point, solve_fixed_point
 from lean_yaw_env.analysis.limit_cycle import RESIDUAL_LIMIT
@@ -45,9 +43,9 @@ def test_symmetric_gait_is_a_fixed_point_of_the_mirrored_step_and_of_the_stride(
     assert cycle.residual <= RESIDUAL_LIMIT
     one = section_map_of(TABLE_1).image(cycle.state)
     assert one == pytest.approx(cycle.state, abs=1e-12)  # the root finder's own limit
-    _, second = stride_map(TABLE_1, cycle.state)
+    second = section_map_of(TABLE_1).over(2).results(cycle.state)[1]
     assert second.state == pytest.approx(cycle.state, abs=1e-12)
-    matrix = stride_jacobian(TABLE_1, cycle.state).matrix
+    matrix = section_map_of(TABLE_1).over(2).derivative(cycle.state)[1]
     # the same product of the same two matrices
     assert matrix == pytest.approx(cycle.jacobian, abs=1e-12)
 
@@ -111,11 +109,10 @@ def test_strike_before_the_masses_arrive_is_refused() -> None:
         section_map.results(find_gait(TABLE_1))
 
 
-def test_stride_with_a_pair_of_equal_offsets_is_that_with_one() -> None:
-    state = find_gait(TABLE_1)
-    pair = stride_jacobian(TABLE_1, state, mass_offset=(0.01, 0.01))
-    one = stride_jacobian(TABLE_1, state, mass_offset=0.01)
-    assert np.array_equal(pair.matrix, one.matrix)
+def test_a_pair_of_equal_offsets_is_one_offset() -> None:
+    assert section_map_of(TABLE_1, mass_offset=(0.01, 0.01)) == section_map_of(
+        TABLE_1, mass_offset=0.01
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""README and docs: their code runs, their links lead somewhere, and numbers that they take from the code are the code's."""
+"""README and docs: their code runs, their links lead somewhere, their commands exist, and numbers that they take from the code are the code's."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import csv
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -25,6 +26,9 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PYTHON_BLOCK = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 FENCED = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
+COMMAND = re.compile(
+    r"(?:python -m (?:agents|benchmarks|lean_yaw_env)|python train\.py|lean-yaw )[^`\n]*"
+)
 
 
 def _program(page: str) -> str:
@@ -65,6 +69,35 @@ def test_the_code_of_a_page_runs_from_top_to_bottom(page: Path, tmp_path: Path) 
         [sys.executable, script], cwd=tmp_path, env=environment, capture_output=True, text=True
     )
     assert result.returncode == 0, result.stderr[-3000:]
+
+
+def _options_by_program() -> dict[str, set[str]]:
+    """Each program with its subcommand and other words, and the options that pages give it."""
+    found: dict[str, set[str]] = {}
+    for page in PAGES:
+        for command in COMMAND.findall(page.read_text(encoding="utf-8")):
+            words = shlex.split(command.split(" && ")[0], comments=True)
+            options = [k for k, word in enumerate(words) if word.startswith("--")]
+            program = shlex.join(words[: options[0]] if options else words)
+            found.setdefault(program, set()).update(words[k].split("=")[0] for k in options)
+    return found
+
+
+@pytest.mark.parametrize(("program", "options"), _options_by_program().items())
+def test_a_documented_command_knows_its_options(program: str, options: set[str]) -> None:
+    words = shlex.split(program)
+    own = ["-m", "lean_yaw_env.cli"] if words[0] == "lean-yaw" else []
+    plain = {**os.environ, "COLUMNS": "300", "TERM": "dumb", "NO_COLOR": "1"}
+    done = subprocess.run(
+        [sys.executable, *own, *words[1:], "--help"],
+        cwd=ROOT,
+        env=plain,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    unknown = {option for option in options if not re.search(rf"{option}\b", done.stdout)}
+    assert not unknown
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import copy
+import json
 import math
+import os
 import pickle
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -222,6 +226,33 @@ def test_a_step_is_the_walker_s_own(mirror: bool) -> None:
         assert ledger == list(result.energy)
         assert info["least_normal_force"] == result.least_normal_force
         assert info["greatest_friction"] == result.greatest_friction
+
+
+_WITHOUT_COMPILER = """
+import json, warnings
+import gymnasium as gym, numpy as np
+import lean_yaw_env
+warnings.simplefilter("ignore")  # of numbers that are meant to overflow
+env = gym.make("LeanYaw/Slalom-v0", sensor_noise=0.1)
+seen = [env.reset(seed=1)[0]] + [env.step(np.array([0.1, 0.2], np.float32))[0] for _ in range(3)]
+print(json.dumps([list(map(float, each)) for each in seen]))
+"""
+
+
+def test_plain_python_gives_the_compiled_environment_s_numbers() -> None:
+    def run(**variables: str) -> Any:
+        done = subprocess.run(
+            [sys.executable, "-c", _WITHOUT_COMPILER],
+            env={**os.environ, **variables},
+            cwd=Path(__file__).parents[1],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return json.loads(done.stdout)
+
+    # single precision: products and sums are not fused there
+    np.testing.assert_allclose(run(NUMBA_DISABLE_JIT="1"), run(), rtol=0.0, atol=1e-5)
 
 
 def test_zero_action_is_the_paper_s_fixed_controller(gait: Vector) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lean_yaw_env import Walker, WalkerParameters
-from lean_yaw_env.analysis.stride import differentiate_step
+from lean_yaw_env.analysis.step_derivatives import differentiate_step
 from lean_yaw_env.kernel.records import Command
 from lean_yaw_env.parameters import Foot, Vector
 from lean_yaw_env.walker import SIDE, StepResult

@@ -38,7 +38,7 @@ import numpy as np
 from lean_yaw_env import Walker, WalkerParameters
 from lean_yaw_env.batch import step_batch
 from lean_yaw_env.kernel import step
-from lean_yaw_env.analysis.stride import differentiate_step
+from lean_yaw_env.analysis.step_derivatives import differentiate_step
 from lean_yaw_env.walker import require_command
 
 walker = Walker(WalkerParameters(ankle_stiffness=0.02, ankle_damping=0.01))

@@ -11,13 +11,14 @@ import pytest
 from scipy.optimize import brentq
 
 from lean_yaw_env import LimitCycle, NoGaitError, Walker, WalkerParameters, find_limit_cycle
-from lean_yaw_env.analysis import ActiveMap, find_gait, planar_gait_rate
+from lean_yaw_env.analysis import ActiveMap, find_gait, planar_gait_rate, section_map_of
 from lean_yaw_env.analysis.fixed_point import solve_fixed_point
 from lean_yaw_env.analysis.path import axle_middle
-from lean_yaw_env.analysis.stride import stride_jacobian, stride_map
 from lean_yaw_env.errors import FellError
 from lean_yaw_env.parameters import MIRROR, Vector
 from tests.reference import ReferenceWalker
+
+STRIDE = section_map_of(Walker()).over(2)
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +31,7 @@ def cycle() -> LimitCycle:
 
 def test_the_gait_repeats_itself_to_round_off(cycle: LimitCycle) -> None:
     assert cycle.residual <= 1e-12
-    first, second = stride_map(Walker(), cycle.state)
+    first, second = STRIDE.results(cycle.state)
     assert np.abs(second.state - cycle.state).max() <= 1e-12
     # and a right step is a left step's mirror image
     assert np.abs(first.state - cycle.state * MIRROR).max() <= 1e-12
@@ -51,10 +52,10 @@ def test_the_gait_is_the_reference_s_to_ten_digits(cycle: LimitCycle) -> None:
 
 
 def test_multipliers_are_those_of_the_exact_jacobian(cycle: LimitCycle) -> None:
-    jacobian = stride_jacobian(Walker(), cycle.state)
-    assert np.abs(jacobian.matrix - cycle.jacobian).max() < 1e-11
-    assert np.abs(jacobian.state - cycle.state).max() < 1e-12
-    own = np.linalg.eigvals(jacobian.matrix)
+    state, matrix = STRIDE.derivative(cycle.state)
+    assert np.abs(matrix - cycle.jacobian).max() < 1e-11
+    assert np.abs(state - cycle.state).max() < 1e-12
+    own = np.linalg.eigvals(matrix)
     own = own[np.argsort(-np.abs(own))]
     assert np.abs(np.abs(own) - np.abs(cycle.eigenvalues)).max() < 1e-10
 
@@ -63,7 +64,7 @@ def test_disturbances_die_out_as_the_first_multiplier_says(cycle: LimitCycle) ->
     state = cycle.state + 1e-4
     distances = []
     for _ in range(120):
-        state = stride_map(Walker(), state)[1].state
+        state = STRIDE.image(state)
         distances.append(np.abs(state - cycle.state).max())
     # after sixty strides the second multiplier, 0.959, has all but died out; second-order terms are of 1e-4
     ratio = (distances[119] / distances[79]) ** (1 / 40)
@@ -106,9 +107,9 @@ def test_turns_to_either_side_are_mirror_images() -> None:
         assert getattr(left, name) == pytest.approx(getattr(right, name), rel=1e-10)
     # the two feet walk on circles that lie a hip width apart, so that the mean of both counts
     chords = [
-        float(np.linalg.norm(first.displacement + second.displacement))
-        for first, second in (stride_map(walker, g.state, mass_offset=m) for g, m in ((right, 0.05), (left, -0.05)))
-    ]  # fmt: skip
+        float(np.linalg.norm(sum(step.displacement for step in gait.steps)))
+        for gait in (right, left)
+    ]
     assert abs(chords[0] - chords[1]) > 0.03 * chords[0]
     assert right.step_length == pytest.approx(0.25 * sum(chords), rel=1e-10)
 
@@ -205,7 +206,7 @@ def test_figure_13_critical_speed_depends_on_the_tilt_alone(
 @pytest.mark.parametrize("offset", [0.002, 0.006, -0.006])
 def test_figure_15_an_offset_turns_the_gait_to_where_the_slope_balances_it(offset: float) -> None:
     cycle = find_limit_cycle(Walker(), mass_offset=offset)
-    first, second = stride_map(Walker(), cycle.state, mass_offset=offset)
+    first, second = cycle.steps
     heading = 0.5 * (first.state[0] + second.state[0])
     closed_form = -math.asin(offset / math.tan(0.01))
     # the closed form balances the moments at the mean heading: left and right steps differ by little
@@ -263,11 +264,11 @@ def test_a_bad_command_is_refused(command: dict[str, float], message: str) -> No
 
 
 def test_a_stride_that_falls_says_which_step_and_how(gait: Vector) -> None:
-    with pytest.raises(FellError, match="fell backward in the stride's first step"):
-        stride_map(Walker(), [0.0, 0.155, 0.0, 0.15, 0.0])
+    with pytest.raises(FellError, match="fell backward in step 1 of the gait"):
+        STRIDE.results(np.array([0.0, 0.155, 0.0, 0.15, 0.0]))
     with pytest.raises(FellError, match=r"fell .* in the step on its left foot"):
-        stride_jacobian(Walker(), [0.0, 0.155, 0.0, 0.15, 0.0])
+        STRIDE.derivative(np.array([0.0, 0.155, 0.0, 0.15, 0.0]))
     state = gait * [1.0, 1.0, 1.0, 0.3, 1.0]
     assert Walker().step(state).fall is None
-    with pytest.raises(FellError, match="fell backward in the stride's second step"):
-        stride_map(Walker(), state)
+    with pytest.raises(FellError, match="fell backward in step 2 of the gait"):
+        STRIDE.results(state)

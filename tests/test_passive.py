@@ -154,7 +154,7 @@ def test_planar_walker_does_not_depend_on_ankle_tilt() -> None:
 
 
 def test_jacobian_agrees_with_differences_of_steps() -> None:
-    section_map = section_map_of(WIDE, n_steps=2)
+    section_map = section_map_of(WIDE).over(2)
     step = 1e-6
     matrix = section_map.derivative(UNEVEN)[1]
     for i, direction in enumerate(np.eye(6)):

@@ -744,7 +744,7 @@ def test_a_renderer_names_a_bad_size(size, message):
         ({"seconds_per_time_unit": 0.0}, "seconds_per_time_unit must be in"),
         ({"swing_share": 1.5}, "swing_share must be in"),
         ({"commanded_heading": [0.1]}, "commanded_heading must be one number or 2"),
-        ({"n_steps": 0}, "n_steps must be in"),
+        ({"n_steps": 0}, "n_steps must be from 1 to"),
     ],
 )
 def test_a_film_names_what_is_wrong_and_writes_nothing(

@@ -344,7 +344,7 @@ def test_basin_fills_in_and_the_gait_lies_in_it(visit):
     endings = page.look("Array.from(leanYaw.active().basin.cells)")
     middle = [endings[32 * 64 + 32], endings[31 * 64 + 31]]
     assert middle == [0, 0]
-    assert len(set(endings)) > 3  # not computed yet, walks on, and several falls
+    assert len(set(endings)) >= 3  # walks on, and falls of several kinds
 
 
 def test_gif_has_the_frames_asked_for(visit):

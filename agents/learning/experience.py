@@ -67,8 +67,8 @@ class TimeDiscountedBuffer(RolloutBuffer):
         self.returns = self.advantages + self.values
 
 
-class _TimedReplay:
-    """What replay buffers of Stable-Baselines3 add to be discounted by exp(-duration / time constant) for each step, and kept in a file.
+class TimeDiscountedReplay(ReplayBuffer):
+    """Stable-Baselines3's replay buffer with a discount of exp(-duration / time constant) for each step.
 
     What an algorithm multiplies the next value by is (1 - done) times its own discount, so that here ``dones``
     are one less the step's discount, and the algorithm's own must be 1.
@@ -86,7 +86,7 @@ class _TimedReplay:
     )  # fmt: skip
 
     def __init__(
-        self: Any, *arguments: Any, time_constant: float, typical_duration: float, **keywords: Any
+        self, *arguments: Any, time_constant: float, typical_duration: float, **keywords: Any
     ) -> None:
         super().__init__(*arguments, **keywords)
         self.time_constant = time_constant
@@ -94,7 +94,7 @@ class _TimedReplay:
         self.durations: NDArray[np.float64] = np.zeros((self.buffer_size, self.n_envs))
 
     def add(
-        self: Any,
+        self,
         obs: Any,
         next_obs: Any,
         action: NDArray[Any],
@@ -106,13 +106,13 @@ class _TimedReplay:
         self.durations[self.pos][np.asarray(done, dtype=np.bool_)] = self.typical_duration
         super().add(obs, next_obs, action, reward, done, infos)  # pyright: ignore[reportAttributeAccessIssue]
 
-    def captured(self: Any) -> Arrays:
+    def captured(self) -> Arrays:
         """The experience there is, and where the next goes."""
         filled = self.buffer_size if self.full else self.pos
         arrays = {name: column[:filled] for name, column in self._columns().items()}
         return arrays | {"position": np.array([self.pos, filled])}
 
-    def restore(self: Any, arrays: Arrays) -> None:
+    def restore(self, arrays: Arrays) -> None:
         """Bring the buffer to what ``captured`` gave, or raise ``KeyError`` or ``ValueError`` if it is another buffer's."""
         self.pos, filled = (int(value) for value in arrays["position"])
         self.full = filled == self.buffer_size
@@ -125,10 +125,6 @@ class _TimedReplay:
         for name in self.columns:
             columns |= named_arrays(name, getattr(self, name))
         return columns
-
-
-class TimeDiscountedReplay(_TimedReplay, ReplayBuffer):
-    """Stable-Baselines3's replay buffer, discounted in time."""
 
     def _get_samples(
         self, batch_inds: NDArray[np.int64], env: VecNormalize | None = None
@@ -149,10 +145,10 @@ class TimeDiscountedReplay(_TimedReplay, ReplayBuffer):
         return ReplayBufferSamples(*(self.to_torch(array) for array in data))
 
 
-class TimeDiscountedHindsight(_TimedReplay, HindsightReplay):
+class TimeDiscountedHindsight(TimeDiscountedReplay, HindsightReplay):
     """Hindsight replay, discounted in time: to be at a goal at the time t is worth exp(-t / time constant)."""
 
-    columns: ClassVar[tuple[str, ...]] = (*_TimedReplay.columns, "ep_start", "ep_length")
+    columns: ClassVar[tuple[str, ...]] = (*TimeDiscountedReplay.columns, "ep_start", "ep_length")
 
     def captured(self) -> Arrays:
         """The experience there is, where the next goes, and where the episodes under way began."""

@@ -10,6 +10,7 @@ from typing import Any
 from optuna import Trial
 
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.registration import TASK_VERSIONS
 from lean_yaw_env.validation import require_choice
 
 from ..agent import Agent
@@ -59,7 +60,8 @@ def space_of(agent: str, task: str, horizon: float | None = None) -> Space:
     """
     require_choice("agent", agent, ("feedback", "lqr", "mpc", *_LEARNERS))
     own = [name for tuned_agent, name in RANGES if tuned_agent == agent]
-    require_choice("task", task, own or agent_entry(agent).tasks)
+    others = [each for each in agent_entry(agent).tasks if each in TASK_VERSIONS]
+    require_choice("task", task, own or others)
     if agent in _LEARNERS:
         return _learner_space(agent, task)
     if agent == "mpc":

@@ -24,7 +24,6 @@ from lean_yaw_env.analysis.passive_map import PassiveMap
 from lean_yaw_env.analysis.periodic import find_periodic_gait
 from lean_yaw_env.analysis.section_map import BODY_PARAMETERS, SectionMap, section_map_of
 from lean_yaw_env.analysis.storage import load_dataset, save_dataset
-from lean_yaw_env.analysis.stride import StrideJacobian, stride_jacobian, stride_map
 
 __all__ = [
     "BODY_PARAMETERS",
@@ -42,7 +41,6 @@ __all__ = [
     "PassiveMap",
     "SectionMap",
     "StepDemand",
-    "StrideJacobian",
     "basin",
     "continue_gait",
     "find_gait",
@@ -61,6 +59,4 @@ __all__ = [
     "section_map_of",
     "stability_map",
     "stable_speeds",
-    "stride_jacobian",
-    "stride_map",
 ]

@@ -22,9 +22,10 @@ from lean_yaw_env.analysis.section_map import (
     CycleStep,
     Linearised,
     SectionMap,
+    require_offsets,
     section_map_of,
 )
-from lean_yaw_env.analysis.stride import differentiate_step, require_offsets
+from lean_yaw_env.analysis.step_derivatives import BY_BODY, BY_STATE, differentiate_step
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.batch import step_batch
 from lean_yaw_env.kernel.records import Command, Outcome
@@ -131,8 +132,9 @@ class ActiveMap(SectionMap):
         return steps
 
     def linear_step(self, state: Vector, k: int, parameter: str | None) -> Linearised:
-        with_body, foot = parameter is not None, FEET_IN_TURN[k % 2]
-        step = differentiate_step(self.walker, state, foot, self._command(k), with_body=with_body)
+        inputs = BY_STATE if parameter is None else BY_BODY
+        foot, command = FEET_IN_TURN[k % 2], self._command(k)
+        step = differentiate_step(self.walker, state, foot, command, inputs=inputs)
         by_parameter, exact = np.zeros(STATE_SIZE), np.zeros((STATE_SIZE, STATE_SIZE))
         if parameter is not None:
             by_inputs = step.jacobian[:STATE_SIZE, STATE_SIZE:]
@@ -250,12 +252,9 @@ def _(
     *,
     inter_leg_angle: float = INTER_LEG_ANGLE,
     mass_offset: float | tuple[float, float] = 0.0,
-    n_steps: int | None = None,
 ) -> ActiveMap:
     offsets = require_offsets(mass_offset)
-    fewest = 1 if offsets[0] == -offsets[1] else 2
-    angle = require_inter_leg_angle(inter_leg_angle)
-    return ActiveMap(walker, angle, offsets, fewest if n_steps is None else n_steps)
+    return ActiveMap(walker, inter_leg_angle, offsets, 1 if offsets[0] == -offsets[1] else 2)
 
 
 def planar_gait_rate(walker: Walker, inter_leg_angle: float, heading: float = 0.0) -> float:

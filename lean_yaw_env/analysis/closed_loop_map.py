@@ -34,7 +34,7 @@ from lean_yaw_env.analysis.section_map import (
     SectionMap,
 )
 from lean_yaw_env.analysis.slopes import Slopes, slopes_of
-from lean_yaw_env.analysis.stride import differentiate_step
+from lean_yaw_env.analysis.step_derivatives import BY_BODY, BY_COMMAND, differentiate_step
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.jacobian import OUTPUTS
 from lean_yaw_env.kernel.records import STEPPED, Command, Outcome
@@ -192,9 +192,8 @@ class ClosedLoopMap(SectionMap):
         foot = FEET_IN_TURN[k % 2]
         asked = self.slopes(state, foot)
         command = self._command(state, asked.values)
-        step = differentiate_step(
-            self.walker, state[:STATE_SIZE], foot, command, with_body=parameter is not None
-        )
+        inputs = BY_COMMAND if parameter is None else BY_BODY
+        step = differentiate_step(self.walker, state[:STATE_SIZE], foot, command, inputs=inputs)
         # by the state, the two commands and the parameter
         size = len(state)
         wide = np.zeros((len(OUTPUTS), size + 3))
@@ -203,7 +202,7 @@ class ClosedLoopMap(SectionMap):
         wide[:, size : size + 2] = step.jacobian[:, STATE_SIZE : STATE_SIZE + 2]
         if parameter is not None:
             index = BODY_PARAMETERS.index(require_choice("parameter", parameter, self.parameters))
-            wide[:, size + 2] = step.jacobian[:, STATE_SIZE + 3 + index]
+            wide[:, size + 2] = step.jacobian[:, BY_COMMAND + index]
         image, found = self._after(state, step.outputs, wide)
         by_command = found[:, size : size + 2]
         return Linearised(

@@ -188,10 +188,9 @@ def _(
     *,
     inter_leg_angle: float = INTER_LEG_ANGLE,
     mass_offset: float | tuple[float, float] = 0.0,
-    n_steps: int | None = None,
 ) -> PassiveMap:
     require_no_command("a passive walker", inter_leg_angle, mass_offset)
-    return PassiveMap(walker, 1 if n_steps is None else n_steps)
+    return PassiveMap(walker)
 
 
 def _planar_parameters(parameters: WalkerParameters) -> WalkerParameters:

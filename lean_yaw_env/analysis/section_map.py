@@ -18,9 +18,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lean_yaw_env.analysis.stride import require_offsets
 from lean_yaw_env.kernel.records import Command
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector
+from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector, require_mass_offset
 from lean_yaw_env.passive import PassiveWalker
 from lean_yaw_env.validation import require_choice
 from lean_yaw_env.walker import Walker
@@ -282,19 +281,17 @@ def section_map_of(
     *,
     inter_leg_angle: float = INTER_LEG_ANGLE,
     mass_offset: float | tuple[float, float] = 0.0,
-    n_steps: int | None = None,
 ) -> SectionMap:
-    """A walker's section map, by default over the fewest steps that a simple gait repeats in.
+    """A walker's section map over the fewest steps that a simple gait repeats in.
 
     Parameters
     ----------
     walker : Walker, PassiveWalker or SectionMap
-        A map is returned as it is, over ``n_steps`` if they are given.
+        A map is returned as it is.
     inter_leg_angle : (0, pi/2)
         Of a ``Walker`` only.
     mass_offset : [-1, 1], or a pair of them (left foot's, right foot's)
         Of a ``Walker`` only.
-    n_steps : int >= 1, optional
 
     Raises
     ------
@@ -310,10 +307,25 @@ def _(
     *,
     inter_leg_angle: float = INTER_LEG_ANGLE,
     mass_offset: float | tuple[float, float] = 0.0,
-    n_steps: int | None = None,
 ) -> SectionMap:
     require_no_command("a map, which holds its own command,", inter_leg_angle, mass_offset)
-    return walker if n_steps is None else walker.over(n_steps)
+    return walker
+
+
+def require_offsets(mass_offset: float | tuple[float, float]) -> tuple[float, float]:
+    """Offsets in force while the left and while the right foot stands, or ``ValueError``."""
+    if isinstance(mass_offset, (tuple, list, np.ndarray)):
+        if len(mass_offset) != 2:
+            raise ValueError(
+                f"mass_offset must be a number or a pair (left foot's, right foot's), "
+                f"got {mass_offset!r}"
+            )
+        left, right = mass_offset
+        return require_mass_offset(left, "left mass_offset"), require_mass_offset(
+            right, "right mass_offset"
+        )
+    both = require_mass_offset(mass_offset)
+    return both, both
 
 
 def require_no_command(

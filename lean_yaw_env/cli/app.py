@@ -204,13 +204,15 @@ def reproduce(
     names: Annotated[
         list[str],
         typer.Argument(
-            help="'all', or pieces: table1 to table3, figure4, figure7 to figure15, "
-            "walker, skateboard, claims-passive, claims-active, claims-steering."
+            help="'all' of the paper, 'classics' of other publications, or pieces: table1 to table3, "
+            "figure3, figure4, figure7 to figure15, walker, skateboard, claims-passive, claims-active, "
+            "claims-steering; simplest-walker, rolling-wheels, uneven-ground, bicycle-benchmark, "
+            "steering-robots."
         ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for report, pictures and numbers.")],
 ) -> Output:
-    """Compute the paper's tables, figures and claims anew and set them beside the printed ones."""
+    """Compute published tables, figures and claims anew and set them beside the printed ones."""
     from lean_yaw_env.paper import reproduce as reproduce_pieces
     from lean_yaw_env.paper import write_report
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import combinations
 from typing import Any, ClassVar
 
@@ -199,12 +200,7 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         if self.options.mirror:
             raise ValueError("mirror must be False for keys that steer left and right, got True")
         held = [keys for n in range(len(_KEYS) + 1) for keys in combinations(_KEYS, n)]
-        return {
-            "".join(keys): np.sum([np.zeros(2), *(_KEYS[key] for key in keys)], axis=0).astype(
-                np.float32
-            )
-            for keys in held
-        }
+        return {"".join(keys): _action_of(keys) for keys in held}
 
     def close(self) -> None:
         """Close the window, if there is one."""
@@ -225,3 +221,10 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
 
     def _fall(self) -> str | None:
         return FallCode(self.simulation.falls[0]).word
+
+
+def _action_of(keys: Iterable[str]) -> NDArray[np.float32]:
+    action = np.zeros(ACTION_SIZE, dtype=np.float32)
+    for key in keys:
+        action += np.array(_KEYS[key], dtype=np.float32)
+    return action

@@ -17,6 +17,7 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
+import numpy as np
 from numba import config, njit, typeof
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
@@ -73,9 +74,10 @@ def borrowed(array: Any) -> Any:
     """The same array without a share in its ownership, for as long as the caller holds it.
 
     A formula that takes an array counts its owners up and down, an atomic operation each, wherever a branch hides from Numba that the two
-    cancel: in a loop over walkers they cost several times what the formulas do.
+    cancel: in a loop over walkers they cost several times what the formulas do. In plain Python, of an array of records the one whose
+    fields are attributes, as compiled code has them.
     """
-    return array
+    return array.view(np.recarray) if array.dtype.names else array
 
 
 def _without_owner_code(typing_context, array):

@@ -5,11 +5,13 @@ from lean_yaw_env.paper.numbers import PaperNumber, Statement
 from lean_yaw_env.paper.registry import ALL, NAMES, PIECES, pieces_named
 from lean_yaw_env.paper.report import as_html, as_markdown, write_report
 from lean_yaw_env.paper.reproduction import Reproduced, Reproduction, reproduce
-from lean_yaw_env.paper.results import Columns, Piece, Result
+from lean_yaw_env.paper.results import CLASSICS, PAPER, Columns, Piece, Result, Section
 
 __all__ = [
     "ALL",
+    "CLASSICS",
     "NAMES",
+    "PAPER",
     "PIECES",
     "VERDICTS",
     "Check",
@@ -19,6 +21,7 @@ __all__ = [
     "Reproduced",
     "Reproduction",
     "Result",
+    "Section",
     "Statement",
     "Verdict",
     "as_html",

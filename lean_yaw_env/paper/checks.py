@@ -12,7 +12,7 @@ Verdict = Literal["agrees", "agrees within rounding", "differs", "open"]
 VERDICTS: tuple[Verdict, ...] = ("agrees", "agrees within rounding", "differs", "open")
 """What a check can come to.
 
-``agrees``: the statement holds, or the number is within what the paper's "about" is taken to allow.
+``agrees``: the statement holds, or the number is within a tolerance that is named with its reason.
 ``agrees within rounding``: ours, rounded to the printed digits, is the printed number.
 ``differs``: it is not, and the remark says why, or what both are. ``open``: it is not, and nobody
 knows why.
@@ -37,6 +37,8 @@ class Check:
         As printed; ours with more digits.
     difference : float or None
         Ours less the paper's, where both are numbers.
+    allowed : str
+        What agrees: the tolerance with its reason, or the criterion.
     verdict : Verdict
     remark : str
         A plain sentence; never empty where the two disagree.
@@ -48,6 +50,7 @@ class Check:
     paper: str
     ours: str
     difference: float | None
+    allowed: str
     verdict: Verdict
     remark: str = ""
 
@@ -81,15 +84,11 @@ def compare(
         Whether a disagreement is unexplained.
     """
     difference = ours - number.value
-    if abs(difference) <= number.half_digit * (1.0 + _ROUND_OFF):
-        verdict: Verdict = "agrees within rounding"
-    elif number.about and abs(difference) <= number.about * abs(number.value):
-        verdict = "agrees"
+    if abs(difference) <= number.room * (1.0 + _ROUND_OFF) + _ROUND_OFF**2:
+        verdict: Verdict = "agrees within rounding" if number.tolerance is None else "agrees"
     else:
         verdict = "open" if is_open else "differs"
     sentences = [remark] if remark else []
-    if verdict == "agrees":
-        sentences.append(f"The paper's number is approximate; {number.about:.0%} is allowed here.")
     if verdict in ("differs", "open"):
         sentences.append(unless or f"The paper has {number.printed}, we find {ours:.5g}.")
     return Check(
@@ -99,6 +98,7 @@ def compare(
         paper=number.printed,
         ours="none found" if math.isnan(ours) else significant(ours, number),
         difference=None if math.isnan(ours) else difference,
+        allowed=number.allowed,
         verdict=verdict,
         remark=" ".join(sentences),
     )
@@ -127,18 +127,9 @@ def judge(
         paper=statement.printed,
         ours=ours,
         difference=None,
+        allowed=statement.criterion,
         verdict="agrees" if holds else "differs",
         remark=" ".join(filter(None, [remark, "" if holds else unless])),
-    )
-
-
-def judge_inside(number: PaperNumber, low: float, high: float) -> Check:
-    """Judge whether a value that the paper says is stable lies in the stable range found."""
-    return judge(
-        Statement(number.name, f"around {number.printed}", number.where, number.meaning),
-        low < number.value < high,
-        ours=f"stable from {low:.5f} to {high:.5f}",
-        unless=f"{number.printed} itself is outside.",
     )
 
 

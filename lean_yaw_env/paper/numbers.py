@@ -1,8 +1,10 @@
-"""The paper's numbers and statements, each once in ``printed.csv``, with the place where it stands.
+"""Numbers and statements as printed, each once, with the place where it stands.
 
-M. Wisse and A. L. Schwab, "Skateboards, Bicycles, and Three-dimensional Biped Walking Machines:
-Velocity-dependent Stability by Means of Lean-to-yaw Coupling", Int. J. Robotics Research 24 (2005)
-417-429. Dimensionless but for the bicycle, which is in SI units.
+``printed.csv`` has the paper's: M. Wisse and A. L. Schwab, "Skateboards, Bicycles, and Three-dimensional
+Biped Walking Machines: Velocity-dependent Stability by Means of Lean-to-yaw Coupling", Int. J. Robotics
+Research 24 (2005) 417-429. ``classics.csv`` has those of other publications; "secondary" marks one that
+was read elsewhere than in the publication itself. Dimensionless but for skateboard and bicycle, which are
+in SI units.
 """
 
 from __future__ import annotations
@@ -12,6 +14,8 @@ import math
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+
+_TABLES = ("printed.csv", "classics.csv")
 
 
 @dataclass(frozen=True)
@@ -24,19 +28,24 @@ class PaperNumber:
     printed : str
         The digits; their last place says how far it was rounded.
     where : str
+        The place where it stands, and the source, if that is not the paper.
     meaning : str
-    about : float
-        Relative room where the paper says "about", "almost" or reads a sketch; 0 where it does not.
-    is_rounded : bool
-        Whether the printed digits are a rounded result, which ours must round to.
+    tolerance : float or None
+        Greatest difference that agrees; None for half of the last printed digit.
+    reason : str
+        Why the tolerance is another one.
     """
 
     name: str
     printed: str
     where: str
     meaning: str
-    about: float = 0.0
-    is_rounded: bool = True
+    tolerance: float | None = None
+    reason: str = ""
+
+    def __post_init__(self) -> None:
+        if (self.tolerance is None) != (not self.reason):
+            raise ValueError(f"number {self.name!r} needs a reason for its tolerance, and no other")
 
     @property
     def value(self) -> float:
@@ -48,59 +57,68 @@ class PaperNumber:
         return len(self.printed.partition(".")[2])
 
     @property
-    def half_digit(self) -> float:
-        """Half a unit of the last printed place: what rounding may hide; 0 if nothing was rounded."""
-        return 0.0 if not self.is_rounded else 0.5 * 10.0**-self.decimals
+    def room(self) -> float:
+        """Greatest difference that agrees."""
+        return 0.5 * 10.0**-self.decimals if self.tolerance is None else self.tolerance
+
+    @property
+    def allowed(self) -> str:
+        """The room with its reason."""
+        return f"± {self.room:.2g}: {self.reason or 'half of the last printed digit'}"
 
 
 @dataclass(frozen=True)
 class Statement:
-    """What the paper says without one number.
+    """What is printed without one number.
 
     Attributes
     ----------
     name : str
     printed : str
-        The paper's words, shortened.
+        The words, shortened.
     where : str
     meaning : str
+    criterion : str
+        What has to hold for it to agree, where the words leave room.
     """
 
     name: str
     printed: str
     where: str
     meaning: str
+    criterion: str = ""
 
 
 @cache
 def _printed() -> dict[str, PaperNumber | Statement]:
-    """All rows of ``printed.csv`` by name."""
+    """All rows of the tables by name."""
     found: dict[str, PaperNumber | Statement] = {}
-    with Path(__file__).with_name("printed.csv").open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            text = (row["name"], row["printed"], row["where"], row["meaning"])
-            if row["kind"] == "number":
-                about = float(row["about"] or 0.0)
-                found[row["name"]] = PaperNumber(*text, about, row["rounded"] != "no")
-            else:
-                found[row["name"]] = Statement(*text)
+    for table in _TABLES:
+        with Path(__file__).with_name(table).open(encoding="utf-8", newline="") as file:
+            for row in csv.DictReader(file):
+                text = (row["name"], row["printed"], row["where"], row["meaning"])
+                if row["kind"] == "number":
+                    tolerance = float(row["tolerance"]) if row["tolerance"] else None
+                    found[row["name"]] = PaperNumber(*text, tolerance, row["allowed"])
+                else:
+                    found[row["name"]] = Statement(*text, row["allowed"])
     return found
 
 
 def number(name: str) -> PaperNumber:
-    """The paper's number of a name, or ``KeyError``."""
+    """The printed number of a name, or ``KeyError``."""
     found = _printed()[name]
     assert isinstance(found, PaperNumber), name
     return found
 
 
 def numbers_of(beginning: str) -> tuple[PaperNumber, ...]:
-    """The paper's numbers whose names begin so, in its order."""
+    """The printed numbers whose names begin so, in their order."""
     return tuple(number(name) for name in _printed() if name.startswith(beginning))
 
 
 def statement(name: str) -> Statement:
-    """The paper's statement of a name, or ``KeyError``."""
+    """The printed statement of a name, or ``KeyError``."""
     found = _printed()[name]
     assert isinstance(found, Statement), name
     return found
@@ -116,3 +134,5 @@ SMALL_OFFSET, LARGE_OFFSET = 0.006, 0.05
 """Mass offsets of Figure 15, to the right."""
 CRITICAL_TILTS = (math.pi / 8.0, math.pi / 4.0)
 """Ankle tilts of Figure 13."""
+GARCIA_SLOPE = 0.009
+"""Slope of the published gaits of the simplest walker."""

@@ -1,27 +1,36 @@
-"""Every piece of the paper that can be reproduced, in the paper's order."""
+"""Every piece that can be reproduced: the paper's in its order, then those of other publications."""
 
 from __future__ import annotations
 
 from functools import partial
 
-from lean_yaw_env.paper.active_claims import active_claims, skateboard_claims, steering_claims
+from lean_yaw_env.paper.active_claims import active_claims
 from lean_yaw_env.paper.active_figures import figure_10, figure_11
+from lean_yaw_env.paper.bicycle_benchmark import bicycle_benchmark
 from lean_yaw_env.paper.bicycle_figure import figure_4
 from lean_yaw_env.paper.passive_claims import passive_claims
 from lean_yaw_env.paper.passive_figures import figure_7, figure_8
-from lean_yaw_env.paper.results import Piece, Result
+from lean_yaw_env.paper.results import CLASSICS, PAPER, Piece, Result
+from lean_yaw_env.paper.rolling_wheels import rolling_wheels
+from lean_yaw_env.paper.simplest_walker import simplest_walker
+from lean_yaw_env.paper.steering_claims import steering_claims
+from lean_yaw_env.paper.steering_robots import steering_robots
 from lean_yaw_env.paper.surface_figures import figure_9, figure_12
 from lean_yaw_env.paper.tables import table_1, table_2, table_3
+from lean_yaw_env.paper.uneven_ground import uneven_ground
+from lean_yaw_env.paper.vehicle_drawings import figure_3, skateboard_figures
 from lean_yaw_env.paper.velocity_figure import figure_13
 from lean_yaw_env.paper.walking_figures import figure_14, figure_15
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.rendering import draw_walker
 
 ALL = "all"
+GROUPS = {ALL: PAPER, CLASSICS: CLASSICS}
+"""Names that stand for every piece of a group."""
 
 
 def walker_drawing() -> Result:
-    """The walker with its parameters; Figures 1 to 3, 5 and 6 are geometry."""
+    """The walker with its parameters; Figures 5 and 6 are geometry."""
     return Result(
         picture=partial(draw_walker, WalkerParameters()),
         caption="The walker and its parameters, in place of Figures 5 and 6.",
@@ -29,7 +38,8 @@ def walker_drawing() -> Result:
 
 
 PIECES: tuple[Piece, ...] = (
-    Piece("skateboard", "Skateboard, eqs. (1) to (3)", skateboard_claims),
+    Piece("skateboard", "Skateboard, eqs. (1) to (3), Figures 1 and 2", skateboard_figures),
+    Piece("figure3", "The bicycle (Figure 3)", figure_3),
     Piece("figure4", "Figure 4: the bicycle's eigenvalues", figure_4),
     Piece("walker", "The walker (Figures 5 and 6)", walker_drawing),
     Piece("table1", "Table 1: default parameters", table_1),
@@ -49,12 +59,39 @@ PIECES: tuple[Piece, ...] = (
     Piece("figure14", "Figure 14: steady walk", figure_14),
     Piece("figure15", "Figure 15: steering", figure_15),
     Piece("claims-steering", "Circles and disturbances (section 4.4)", steering_claims),
+    Piece(
+        "simplest-walker",
+        "The simplest walking model: Garcia et al. 1998, Bhounsule 2014",
+        simplest_walker,
+        CLASSICS,
+    ),
+    Piece(
+        "rolling-wheels",
+        "Rimless, round and synthetic wheels (McGeer 1990), rocking sideways (Kuo 1999)",
+        rolling_wheels,
+        CLASSICS,
+    ),
+    Piece(
+        "uneven-ground",
+        "On uneven ground: Hobbelen and Wisse 2007, Byl and Tedrake 2009",
+        uneven_ground,
+        CLASSICS,
+    ),
+    Piece(
+        "bicycle-benchmark",
+        "The benchmark bicycle: Meijaard et al. 2007, BicycleParameters",
+        bicycle_benchmark,
+        CLASSICS,
+    ),
+    Piece("steering-robots", "Steering walkers built since", steering_robots, CLASSICS),
 )
 NAMES = tuple(piece.name for piece in PIECES)
 
 
 def pieces_named(names: tuple[str, ...] | list[str]) -> tuple[Piece, ...]:
-    """Pieces by their names, in the paper's order, each once; ``all`` names every one.
+    """Pieces by their names, in the order of ``PIECES``, each once.
+
+    ``all`` names every piece of the paper, ``classics`` every piece of other publications.
 
     Raises
     ------
@@ -62,10 +99,11 @@ def pieces_named(names: tuple[str, ...] | list[str]) -> tuple[Piece, ...]:
         If there is no piece of a name, or no name.
     """
     if not names:
-        raise ValueError(f"name at least one of {ALL}, {', '.join(NAMES)}")
+        raise ValueError(f"name at least one of {', '.join((*GROUPS, *NAMES))}")
     for name in names:
-        if name != ALL and name not in NAMES:
+        if name not in GROUPS and name not in NAMES:
             raise ValueError(
-                f"nothing is called {name!r}: name {ALL} or some of {', '.join(NAMES)}"
+                f"nothing is called {name!r}: name {ALL}, {CLASSICS} or some of {', '.join(NAMES)}"
             )
-    return tuple(piece for piece in PIECES if ALL in names or piece.name in names)
+    wanted = {GROUPS[name] for name in names if name in GROUPS}
+    return tuple(piece for piece in PIECES if piece.group in wanted or piece.name in names)

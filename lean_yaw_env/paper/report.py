@@ -11,17 +11,32 @@ from pathlib import Path
 from lean_yaw_env.files import write_text
 from lean_yaw_env.paper.checks import Check
 from lean_yaw_env.paper.reproduction import Reproduced, Reproduction, write_columns
+from lean_yaw_env.paper.results import CLASSICS, PAPER, Columns, Section
 
-TITLE = "Skateboards, bicycles and three-dimensional walkers: the paper beside ours"
-_INTRODUCTION = (
-    "Wisse and Schwab, “Skateboards, Bicycles, and Three-dimensional Biped Walking Machines: "
-    "Velocity-dependent Stability by Means of Lean-to-yaw Coupling” (2005), computed anew from "
-    "scratch. Walkers are dimensionless: leg length, gravity and total mass are one. A number "
-    "“agrees within rounding” if ours rounds to the printed digits; “agrees” if a statement "
-    "holds, or a number that the paper gives as approximate is met within the room named; it "
-    "“differs” if not; “open” means that the reason for a difference is not known."
+TITLES = {
+    PAPER: "Skateboards, bicycles and three-dimensional walkers: the paper beside ours",
+    CLASSICS: "The classics of passive walking and of bicycles: their numbers beside ours",
+}
+_INTRODUCTIONS = {
+    PAPER: (
+        "Wisse and Schwab, “Skateboards, Bicycles, and Three-dimensional Biped Walking Machines: "
+        "Velocity-dependent Stability by Means of Lean-to-yaw Coupling” (2005), computed anew from "
+        "scratch."
+    ),
+    CLASSICS: (
+        "Published numbers of the field that these models can be held against, computed anew. "
+        "Where the publication itself could not be read, the source of its number is marked "
+        "“secondary”; numbers for which no source could be read are left out, and said to be."
+    ),
+}
+_VERDICTS = (
+    "Walkers are dimensionless: leg length, gravity and total mass are one. Each row says what "
+    "difference is allowed, and why. A number “agrees within rounding” if ours rounds to the "
+    "printed digits; “agrees” if it is within another tolerance, or if a statement meets its "
+    "criterion; it “differs” if not, and the remark says why; “open” means that the reason for a "
+    "difference is not known, and a section says what was tried."
 )
-_HEADINGS = ("what", "where", "paper", "ours", "difference", "verdict", "remark")
+_HEADINGS = ("what", "where", "paper", "ours", "difference", "allowed", "verdict", "remark")
 _STYLE = """
 :root { color-scheme: light; }
 body { font: 16px/1.5 system-ui, sans-serif; color: #23252b; background: #fbfaf7;
@@ -61,22 +76,42 @@ def cells(check: Check) -> tuple[str, ...]:
     difference = "" if check.difference is None else f"{check.difference:+.2g}"
     what = f"{check.name}: {check.statement}"
     return (
-        what, check.where, check.paper, check.ours, difference, check.verdict, check.remark,
+        what, check.where, check.paper, check.ours, difference, check.allowed, check.verdict,
+        check.remark,
     )  # fmt: skip
+
+
+def _heading(reproduction: Reproduction) -> tuple[str, str]:
+    """Title and introduction for the publications that were reproduced."""
+    found = [name for name in TITLES if any(e.piece.group == name for e in reproduction.pieces)]
+    introductions = [_INTRODUCTIONS[name] for name in found]
+    return TITLES[found[0] if found else PAPER], " ".join([*introductions, _VERDICTS])
+
+
+def _rows(columns: Columns) -> list[tuple[str, ...]]:
+    """The rows of a section's table as they are read."""
+    return list(zip(*([str(cell) for cell in column] for column in columns.values()), strict=True))
 
 
 def as_markdown(reproduction: Reproduction) -> str:
     """The report in Markdown; pictures by their file names beside it."""
-    parts = [f"# {TITLE}", _INTRODUCTION, _counts_text(reproduction)]
+    title, introduction = _heading(reproduction)
+    parts = [f"# {title}", introduction, _counts_text(reproduction)]
     disagreeing = [check for check in reproduction.checks if not check.agrees]
     if disagreeing:
-        parts += ["## Where they disagree", _markdown_table(disagreeing)]
+        rows = [cells(check) for check in disagreeing]
+        parts += ["## Where they disagree", _markdown_table(_HEADINGS, rows)]
     for each in reproduction.pieces:
         parts.append(f"## {each.piece.title}")
         if each.picture is not None:
             parts += [f"![{each.piece.title}]({each.picture.name})", each.result.caption]
         if each.result.checks:
-            parts.append(_markdown_table(each.result.checks))
+            rows = [cells(check) for check in each.result.checks]
+            parts.append(_markdown_table(_HEADINGS, rows))
+        for section in each.result.sections:
+            parts += [f"### {section.title}", section.text]
+            if section.table:
+                parts.append(_markdown_table(tuple(section.table), _rows(section.table)))
         if each.result.tables:
             files = ", ".join(f"[{stem}.csv]({stem}.csv)" for stem in each.result.tables)
             parts.append(f"Numbers: {files}")
@@ -90,20 +125,21 @@ def as_html(reproduction: Reproduction) -> str:
         f'<a href="#{each.piece.name}">{escape(each.piece.name)}</a>'
         for each in reproduction.pieces
     )
+    title, introduction = _heading(reproduction)
     parts = [
-        f"<h1>{escape(TITLE)}</h1>",
-        f"<p>{escape(_INTRODUCTION)}</p>",
+        f"<h1>{escape(title)}</h1>",
+        f"<p>{escape(introduction)}</p>",
         f"<p><strong>{escape(_counts_text(reproduction))}</strong></p>",
         f"<nav>{links}</nav>",
     ]
     if disagreeing:
-        parts += ["<h2>Where they disagree</h2>", _html_table(disagreeing)]
+        parts += ["<h2>Where they disagree</h2>", _html_checks(disagreeing)]
     parts += [_html_piece(each) for each in reproduction.pieces]
     body = "\n".join(parts)
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(TITLE)}</title>\n<style>{_STYLE}</style>\n</head>\n"
+        f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
         f"<body>\n{body}\n</body>\n</html>\n"
     )
 
@@ -113,17 +149,32 @@ def _counts_text(reproduction: Reproduction) -> str:
     return f"{len(reproduction.checks)} checks: {counts}."
 
 
-def _markdown_table(checks: Sequence[Check]) -> str:
-    lines = ["| " + " | ".join(_HEADINGS) + " |", "|" + "---|" * len(_HEADINGS)]
-    for check in checks:
-        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells(check)) + " |")
+def _markdown_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = ["| " + " | ".join(headings) + " |", "|" + "---|" * len(headings)]
+    for row in rows:
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |")
     return "\n".join(lines)
 
 
-def _html_table(checks: Sequence[Check]) -> str:
-    head = "".join(f"<th>{escape(heading)}</th>" for heading in _HEADINGS)
-    rows = "\n".join(_html_row(check) for check in checks)
-    return f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{rows}\n</tbody>\n</table>"
+def _html_checks(checks: Sequence[Check]) -> str:
+    return _html_table(_HEADINGS, [_html_row(check) for check in checks])
+
+
+def _html_section(section: Section) -> str:
+    text = f"<h3>{escape(section.title)}</h3>\n<p>{escape(section.text)}</p>"
+    if not section.table:
+        return text
+    rows = [
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>"
+        for row in _rows(section.table)
+    ]
+    return text + "\n" + _html_table(tuple(section.table), rows)
+
+
+def _html_table(headings: Sequence[str], rows: Sequence[str]) -> str:
+    head = "".join(f"<th>{escape(heading)}</th>" for heading in headings)
+    body = "\n".join(rows)
+    return f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>"
 
 
 def _html_row(check: Check) -> str:
@@ -147,5 +198,6 @@ def _html_piece(each: Reproduced) -> str:
             f"<figcaption>{escape(each.result.caption)}</figcaption></figure>"
         )
     if each.result.checks:
-        parts.append(_html_table(each.result.checks))
+        parts.append(_html_checks(each.result.checks))
+    parts += [_html_section(section) for section in each.result.sections]
     return "\n".join(parts)

@@ -23,6 +23,7 @@ CHECK_COLUMNS = (
     "paper",
     "ours",
     "difference",
+    "allowed",
     "verdict",
     "remark",
 )

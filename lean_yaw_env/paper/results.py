@@ -9,8 +9,28 @@ from typing import Any
 
 from lean_yaw_env.paper.checks import Check
 
+PAPER, CLASSICS = "paper", "classics"
+"""Groups of pieces: what the paper has, and what other publications have."""
+
 Columns = Mapping[str, Iterable[Any]]
 """Equally long columns by their headings."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the report that no verdict sums up: what was tried, or a number of ours alone.
+
+    Attributes
+    ----------
+    title : str
+    text : str
+    table : Columns
+        Shown beneath; cells as they are to be read.
+    """
+
+    title: str
+    text: str
+    table: Columns = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -26,12 +46,14 @@ class Result:
         Writes the picture into a PNG file of the given path, whole or not at all.
     caption : str
         What the picture shows and what in it is our choice.
+    sections : tuple of Section
     """
 
     checks: tuple[Check, ...] = ()
     tables: Mapping[str, Columns] = field(default_factory=dict)
     picture: Callable[[Path], None] | None = None
     caption: str = ""
+    sections: tuple[Section, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -45,8 +67,10 @@ class Piece:
     title : str
     make : function
         Computes it.
+    group : PAPER or CLASSICS
     """
 
     name: str
     title: str
     make: Callable[[], Result]
+    group: str = PAPER

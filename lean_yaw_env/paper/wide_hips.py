@@ -32,6 +32,7 @@ ROW_WIDTHS.flags.writeable = False
 _TILTS = (0.13, 0.19)
 _BETWEEN = 12
 """Points looked at between two of a branch."""
+_WIDE_TILTS = (0.18, 0.5)
 _ENTRIES = (0.14, 0.18)
 """Ankle tilts at which the branch is followed from no hip width, rad."""
 
@@ -45,10 +46,13 @@ class WideHipRow:
     hip_width : float
     pieces : tuple of (tilts, radii)
         Spectral radii of the stride along pieces of branches between folds, tilts rising.
+    contraction : float
+        Magnitude of the product of the stride's four greatest multipliers, where the spectral radius is least.
     """
 
     hip_width: float
     pieces: tuple[tuple[Vector, Vector], ...]
+    contraction: float
 
     @property
     def stable_tilts(self) -> tuple[float, float]:
@@ -100,28 +104,41 @@ def widest_stable_hip() -> tuple[float, float]:
     return width, _least_radius(width)[1]
 
 
+def widest_gait() -> float:
+    """The widest hip with a passive gait, stable or not: where its branch folds back, at the tilts tried."""
+    return max(
+        float(_over_widths(_entry_walker(tilt, 0.0), 0.25).values.max()) for tilt in _WIDE_TILTS
+    )
+
+
+def _over_widths(flat: PassiveWalker, width: float) -> Branch:
+    state = passive_gait(flat).state
+    return continue_gait(flat, "hip_width", (0.0, width), state=state, most_points=60)
+
+
 def _least_radius(width: float) -> tuple[float, float]:
     """The least spectral radius over the tilt at a hip width, and the tilt."""
     start, state = gait_at(_ENTRIES[1], width)
-    tilts, radii = _dense(_branch(start, state, upward=False))
+    tilts, radii, _ = _dense(_branch(start, state, upward=False))
     lowest = int(np.argmin(radii))
     return float(radii[lowest]), float(tilts[lowest])
 
 
 def _row(width: float) -> WideHipRow:
-    pieces = []
+    pieces, least = [], (np.inf, np.nan)
     for branch in _branches(width):
-        tilts, radii = _dense(branch)
+        tilts, radii, products = _dense(branch)
+        least = min(least, (float(radii.min()), float(products[radii.argmin()])))
         folds = np.flatnonzero(np.diff(np.sign(np.diff(tilts))) != 0) + 1
         bounds = [0, *folds.tolist(), tilts.size - 1]
         for first, last in itertools.pairwise(bounds):
             order = np.argsort(tilts[first : last + 1]) + first
             pieces.append((tilts[order], radii[order]))
-    return WideHipRow(width, tuple(pieces))
+    return WideHipRow(width, tuple(pieces), least[1])
 
 
-def _dense(branch: Branch) -> tuple[Vector, Vector]:
-    """Tilts and spectral radii of the stride along a branch, between its points too.
+def _dense(branch: Branch) -> tuple[Vector, Vector, Vector]:
+    """Along a branch, between its points too: tilts, the stride's spectral radii, products of the four greatest multipliers.
 
     The multipliers branch where two meet, but their characteristic polynomial is smooth along the
     branch: its coefficients are splined, and its roots taken.
@@ -130,8 +147,8 @@ def _dense(branch: Branch) -> tuple[Vector, Vector]:
     polynomials = np.array([np.poly(values).real for values in stride])
     points = np.arange(branch.values.size)
     fine = np.linspace(0, points[-1], _BETWEEN * points[-1] + 1)
-    radii = [np.abs(np.roots(row)).max() for row in CubicSpline(points, polynomials)(fine)]
-    return CubicSpline(points, branch.values)(fine), np.array(radii)
+    roots = np.sort([np.abs(np.roots(row)) for row in CubicSpline(points, polynomials)(fine)])
+    return CubicSpline(points, branch.values)(fine), roots[:, -1], roots[:, -4:].prod(axis=1)
 
 
 def _branches(width: float) -> list[Branch]:
@@ -155,10 +172,9 @@ def _branch(start: PassiveWalker, state: Vector, upward: bool) -> Branch:
 def gait_at(tilt: float, width: float) -> tuple[PassiveWalker, Vector]:
     """The gait at a tilt and hip width, of the branch from no hip width."""
     flat = _entry_walker(tilt, 0.0)
-    state = passive_gait(flat).state
     if width == 0.0:
-        return flat, state
-    branch = continue_gait(flat, "hip_width", (0.0, width), state=state, most_points=60)
+        return flat, passive_gait(flat).state
+    branch = _over_widths(flat, width)
     if abs(branch.values[-1] - width) > 1e-9:
         raise NoGaitError(f"the gait at ankle tilt {tilt:g} ends before hip width {width:g}")
     return _entry_walker(tilt, width), branch.states[-1]

@@ -1,6 +1,7 @@
 // What exhibits share: the kernel, the stage, the clock, and places on the page.
 
 import type { Kernel } from "./kernel/kernel";
+import type { Name } from "./scene/labels";
 import type { Stage } from "./scene/stage";
 import type { Settings } from "./share/link";
 
@@ -30,6 +31,8 @@ export interface Exhibit {
   /** Show numbers anew after the units have changed. */
   refresh(): void;
   resize(): void;
+  /** Names of the parts on the stage, where they are now. */
+  names(): Name[];
 }
 
 export interface App {

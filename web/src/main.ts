@@ -3,6 +3,7 @@ import type { App, Exhibit } from "./app";
 import { BicycleExhibit, SkateboardExhibit } from "./exhibits/vehicle_exhibit";
 import { WalkExhibit } from "./exhibits/walk_exhibit";
 import { Kernel } from "./kernel/kernel";
+import { Labels } from "./scene/labels";
 import { Stage, type View } from "./scene/stage";
 import { makeGif } from "./share/film";
 import { FrameTimes } from "./share/frame_times";
@@ -22,6 +23,7 @@ async function main(): Promise<void> {
   const canvas = byId<HTMLCanvasElement>("stage");
   const stage = new Stage(canvas);
   const notice = byId("notice");
+  const labels = new Labels(byId("labels"), stage);
   let playing = true;
   let rate = 0.4;
   let held = false;
@@ -72,6 +74,10 @@ async function main(): Promise<void> {
       app.changed();
     },
     view: (view: View) => stage.setView(view),
+    names(shown) {
+      labels.shown = shown;
+      labels.update(active.names());
+    },
     steer: (direction) => active.steer(direction),
     stride: (direction) => active.stride(direction),
   });
@@ -85,6 +91,7 @@ async function main(): Promise<void> {
     active?.leave();
     active = exhibit;
     app.notice(null);
+    labels.clear();
     tabs.forEach((tab, each) => {
       tab.setAttribute("aria-selected", String(each === exhibit));
       tab.tabIndex = each === exhibit ? 0 : -1;
@@ -149,7 +156,7 @@ async function main(): Promise<void> {
     if (held) return;
     frames.begin();
     if (playing || active.isMoving || stage.isTurning) active.frame(playing ? real * rate * active.timeScale() : 0, real);
-    stage.renderIfStale();
+    if (stage.renderIfStale()) labels.update(active.names());
     frames.end();
   }
   requestAnimationFrame(frame);

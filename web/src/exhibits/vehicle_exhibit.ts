@@ -9,6 +9,7 @@ import {
   type SkateboardParameters,
 } from "../physics/vehicles";
 import { BENCHMARK_BICYCLE, PAPER_BICYCLE, SKATEBOARD } from "../physics/vehicle_data";
+import type { Name } from "../scene/labels";
 import { PALETTE } from "../scene/palette";
 import { PushArrow } from "../scene/push_arrow";
 import { Trail } from "../scene/trail";
@@ -46,7 +47,7 @@ abstract class VehicleExhibit implements Exhibit {
   protected abstract readonly story: string;
   protected abstract readonly fastest: number;
   protected abstract readonly knobs: Knob[];
-  protected abstract readonly names: string[];
+  protected abstract readonly angles: string[];
   protected abstract values: Record<string, number>;
   protected abstract readonly defaults: Record<string, number>;
   protected abstract vehicle(): LinearVehicle;
@@ -107,7 +108,7 @@ abstract class VehicleExhibit implements Exhibit {
   }
 
   reset(): void {
-    this.state = this.names.flatMap(() => [0, 0]);
+    this.state = this.angles.flatMap(() => [0, 0]);
     this.state[0] = 0.035;
     [this.x, this.z, this.heading, this.rolled, this.time] = [0, 0, 0, 0, 0];
     this.fallenFor = -1;
@@ -122,13 +123,13 @@ abstract class VehicleExhibit implements Exhibit {
     if (this.fallenFor >= 0) return;
     const kick = this.kicks * KICK * (strong ? 2.5 : 1);
     this.kicks *= -1;
-    this.state[this.names.length] += kick;
+    this.state[this.angles.length] += kick;
     this.arrow.show(kick, 0, Math.abs(kick) / KICK);
   }
 
   /** Arrow keys push gently to the side, as a rider's hip would. */
   steer(direction: number): void {
-    if (this.fallenFor < 0) this.state[this.names.length] += 0.12 * direction;
+    if (this.fallenFor < 0) this.state[this.angles.length] += 0.12 * direction;
   }
 
   stride(direction: number): void {
@@ -147,6 +148,18 @@ abstract class VehicleExhibit implements Exhibit {
 
   get isMoving(): boolean {
     return this.arrow.isShown;
+  }
+
+  /** Names of parts by their places in the vehicle's own upright frame: ahead, up, right. */
+  protected abstract parts(): Name[];
+
+  names(): Name[] {
+    const [cosine, sine] = [Math.cos(this.heading), Math.sin(this.heading)];
+    const [up, aside] = [Math.cos(this.state[0]), Math.sin(this.state[0])];
+    return this.parts().map(([name, [x, y, z]]) => {
+      const [high, right] = [y * up - z * aside, y * aside + z * up];
+      return [name, [this.x + cosine * x + sine * right, high, this.z - sine * x + cosine * right]];
+    });
   }
 
   timeScale(): number {
@@ -188,7 +201,7 @@ abstract class VehicleExhibit implements Exhibit {
         break;
       }
     }
-    this.history.add(this.time, this.state.slice(0, this.names.length));
+    this.history.add(this.time, this.state.slice(0, this.angles.length));
     this.trail.extend([[this.x, 0.006, this.z]]);
   }
 
@@ -220,7 +233,7 @@ abstract class VehicleExhibit implements Exhibit {
     const fact = (name: string, value: string) => h("span", {}, h("small", {}, name), value);
     this.app.hud.replaceChildren(
       fact("time", `${number(this.time, 1)} s`), fact("speed", `${number(this.values.speed, 2)} m/s`),
-      ...this.names.map((name, k) => fact(name, degrees(Math.max(-9, Math.min(9, this.state[k]))))),
+      ...this.angles.map((name, k) => fact(name, degrees(Math.max(-9, Math.min(9, this.state[k]))))),
       fact("heading", degrees(this.heading)),
     );
   }
@@ -270,7 +283,7 @@ abstract class VehicleExhibit implements Exhibit {
   private build(): Node[] {
     this.eigenvalues = new EigenvaluesPanel(this.fastest > 6 ? 10 : 6);
     this.eigenvalues.onPick = (speed) => this.set({ speed: Number(speed.toFixed(2)) });
-    this.history = new HistoryPanel(this.names, [PALETTE.left, PALETTE.right]);
+    this.history = new HistoryPanel(this.angles, [PALETTE.left, PALETTE.right]);
     for (const knob of this.knobs) {
       this.sliders.set(knob.name, new Slider({ ...knob, id: `${this.id}-${knob.name}`, value: this.values[knob.name], onInput: (value) => this.set({ [knob.name]: value }) }));
     }
@@ -301,7 +314,7 @@ export class SkateboardExhibit extends VehicleExhibit {
   readonly subtitle = "Leaning turns the wheels, nothing else";
   protected readonly story = "The simplest case. A stiff rider on a board whose tilted axles turn the wheels as it leans. Fast enough, the board rolls back under the fall: above its critical speed it does not fall.";
   protected readonly fastest = 4;
-  protected readonly names = ["lean"];
+  protected readonly angles = ["lean"];
   protected readonly defaults: Record<string, number> = { speed: 1.4, spring_stiffness: SKATEBOARD.spring_stiffness, steering_tilt: SKATEBOARD.steering_tilt, wheelbase: SKATEBOARD.wheelbase, rider_height: SKATEBOARD.rider_height, damping: 25 };
   protected values = { ...this.defaults };
   protected readonly knobs: Knob[] = [
@@ -351,6 +364,14 @@ export class SkateboardExhibit extends VehicleExhibit {
     this.skateboardModel?.update(this.x, this.z, this.heading, lean, this.rolled);
   }
 
+  protected parts(): Name[] {
+    const half = 0.5 * this.values.wheelbase;
+    return [
+      ["rider: a point mass at the belt", [0, this.values.rider_height, 0.11]],
+      ["steering axis, tilted, with a spring", [half - 0.05, 0.09, 0]], ["wheels turn as the board leans", [-half, 0.034, 0.1]],
+    ]; // prettier-ignore
+  }
+
   protected presets(): [string, () => void][] {
     return [
       ["Below critical", () => { this.set({ ...this.defaults, speed: 0.7 }); this.reset(); }],
@@ -366,7 +387,7 @@ export class BicycleExhibit extends VehicleExhibit {
   readonly subtitle = "A steering fork of its own turns leaning into yaw";
   protected readonly story = "No hands. A bicycle that leans steers into the lean, by its trail, its tilted fork and its spinning wheel. Between its weave speed and its capsize speed this keeps it up without any control.";
   protected readonly fastest = 10;
-  protected readonly names = ["lean", "steer"];
+  protected readonly angles = ["lean", "steer"];
   protected readonly defaults: Record<string, number> = { speed: 5.2, benchmark: 0, trail: PAPER_BICYCLE.trail, steer_axis_tilt: PAPER_BICYCLE.steer_axis_tilt, wheelbase: PAPER_BICYCLE.wheelbase, spin: 1 };
   protected values = { ...this.defaults };
   protected readonly knobs: Knob[] = [
@@ -424,6 +445,16 @@ export class BicycleExhibit extends VehicleExhibit {
   protected placeModel(lean: number): void {
     const steer = Math.max(-1.2, Math.min(1.2, this.state[1] || 0));
     this.bicycleModel?.update(this.x, this.z, this.heading, lean, steer, this.rolled);
+  }
+
+  protected parts(): Name[] {
+    const { wheelbase, trail } = this.values;
+    const tilt = this.values.steer_axis_tilt;
+    return [
+      ["steering axis", [wheelbase + trail - 1.2 * Math.sin(tilt), 1.2 * Math.cos(tilt), 0]],
+      ["rear frame with the rider", [0.3, 1.15, 0.1]], ["front frame", [wheelbase - 0.1, 0.62, 0.05]],
+      ["trail: from here to the front contact", [wheelbase + trail, 0, 0]], ["rear contact", [0, 0, 0]],
+    ]; // prettier-ignore
   }
 
   protected presets(): [string, () => void][] {

@@ -9,11 +9,12 @@ import { PhasePanel, ReturnMapPanel } from "../panels/phase";
 import { findCycle, type Cycle } from "../physics/cycle";
 import { CycleFinder } from "../physics/finder";
 import { passiveCycleNear } from "../physics/passive_cycle";
-import { halfArc, shapeOf, type Vector } from "../physics/geometry";
+import { add, halfArc, shapeOf, type Vector } from "../physics/geometry";
 import { Walk, type Kind, type StepRecord } from "../physics/walk";
 import { mirrored, TABLE_1, type Parameters } from "../physics/walker";
 import type { State } from "../kernel/kernel";
 import { Footprints } from "../scene/footprints";
+import type { Name } from "../scene/labels";
 import { PALETTE } from "../scene/palette";
 import { PushArrow } from "../scene/push_arrow";
 import { Trail } from "../scene/trail";
@@ -25,10 +26,10 @@ import { Facts, h, section } from "../ui/dom";
 import { number } from "../ui/plot";
 import { Slider } from "../ui/slider";
 
-type Name = Exclude<keyof Parameters, "slope_turns" | "more">;
+type Knobbed = Exclude<keyof Parameters, "slope_turns" | "more">;
 
 interface Knob {
-  name: Name;
+  name: Knobbed;
   label: string;
   hint: string;
   low: number;
@@ -40,7 +41,7 @@ interface Knob {
 const length = (value: number) => units.length(value);
 const angle = (value: number) => units.angle(value);
 
-const KNOBS: Record<Name, Knob> = {
+const KNOBS: Record<Knobbed, Knob> = {
   hip_width: { name: "hip_width", label: "Hip width", hint: "Distance between the two hips, in leg lengths", low: 0, high: 0.7, step: 0.005, show: length },
   foot_radius: { name: "foot_radius", label: "Foot radius", hint: "Radius of the cylinder feet, in leg lengths", low: 0, high: 0.9, step: 0.005, show: length },
   ankle_tilt: { name: "ankle_tilt", label: "Ankle tilt", hint: "Angle of the ankle axis from the leg: small steers strongly, 90 degrees does not turn the foot", low: 0.05, high: Math.PI / 2, step: 0.005, show: angle },
@@ -55,9 +56,9 @@ interface Variety {
   id: string;
   title: string;
   subtitle: string;
-  knobs: Name[];
+  knobs: Knobbed[];
   defaults: Parameters;
-  ranges: Partial<Record<Name, [number, number, number]>>;
+  ranges: Partial<Record<Knobbed, [number, number, number]>>;
   /** How the start differs from the gait, as a start that is worth looking at: pitch rate, ankle rate. */
   nudge: [number, number];
   push: [number, number];
@@ -175,7 +176,7 @@ export class WalkExhibit implements Exhibit {
   readonly subtitle: string;
   readonly parameters: Parameters;
   private readonly variety: Variety;
-  private readonly sliders = new Map<Name, Slider>();
+  private readonly sliders = new Map<Knobbed, Slider>();
   private readonly multipliers = new MultipliersPanel();
   private readonly energyPanel = new EnergyPanel();
   private readonly phase = new PhasePanel();
@@ -653,6 +654,22 @@ export class WalkExhibit implements Exhibit {
       fact("heading", units.angle(heading, 2)),
       ...(this.kind === "steered" ? [steeringBar(offset)] : []),
     );
+  }
+
+  names(): Name[] {
+    const drawn = this.drawn(this.walk.current.parameters);
+    const shape = shapeOf(drawn, this.apart(this.walk.pose()));
+    const leg = this.walk.side === 1 ? shape.left : shape.right;
+    const swing = this.walk.side === 1 ? shape.right : shape.left;
+    const names: Name[] = [
+      ["mass: moves along the axle", shape.masses[0]],
+      ["stance leg, length 1", add(leg.ankle, leg.leg[1], 0.55)],
+      ["swing leg: no mass", add(swing.ankle, swing.leg[1], 0.6)],
+      ["ankle axis, tilted", add(leg.ankle, leg.ankleAxis, -0.22)],
+      ["foot: rolls like a cylinder", add(swing.ankle, swing.foot[0], 0.1)],
+    ];
+    if (drawn.hip_width > 0.12) names.push(["centre of mass", shape.centre], ["hip axle", add(shape.masses[1], shape.axle, 0.09)]);
+    return names;
   }
 
   /** The state right after the last heel strike, on the left foot; for tests and the curious. */

@@ -189,9 +189,11 @@ export class Stage {
     this.isStale = true;
   }
 
-  /** Draw if anything has moved since the last picture, the camera included. */
-  renderIfStale(): void {
-    if (this.controls.update() || this.isStale) this.render();
+  /** Draw if anything has moved since the last picture, the camera included; whether it has. */
+  renderIfStale(): boolean {
+    const moves = this.controls.update() || this.isStale;
+    if (moves) this.render();
+    return moves;
   }
 
   /** Whether the camera is on its way to another place. */

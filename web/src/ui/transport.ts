@@ -10,6 +10,7 @@ export interface Actions {
   push(strong: boolean): void;
   rate(value: number): void;
   view(view: View): void;
+  names(shown: boolean): void;
   steer(direction: number): void;
   stride(direction: number): void;
 }
@@ -22,6 +23,7 @@ const ICONS = {
   pause: '<path d="M7 5h3.6v14H7zM13.4 5H17v14h-3.6z"/>',
   step: '<path d="M6 5.5v13l9-6.5zM16 5h2.6v14H16z"/>',
   reset: '<path d="M12 5V2L7 6.5 12 11V8a4.9 4.9 0 1 1-4.9 5H4.2A7.8 7.8 0 1 0 12 5z"/>',
+  names: '<path d="M4 5h16v2.6h-6.6V19h-2.8V7.6H4z"/>',
   push: '<path d="M3 10.6h10V6.4l8 5.6-8 5.6v-4.2H3z"/>',
 };
 
@@ -35,6 +37,7 @@ export class Transport {
   private readonly playButton: HTMLButtonElement;
   private readonly rateInput: HTMLInputElement;
   private readonly rateOutput: HTMLOutputElement;
+  private readonly namesButton: HTMLButtonElement;
   private readonly walkOnly: HTMLElement[] = [];
   private readonly held = new Set<string>();
 
@@ -52,11 +55,13 @@ export class Transport {
     this.rateOutput = h("output", { for: "rate" });
     const view = h("select", { id: "camera", "aria-label": "Camera", onchange: () => actions.view(view.value as View) },
       ...VIEWS.map(([value, name]) => h("option", { value }, name)));
-    this.walkOnly.push(step, push);
+    const names = button("names", "Names of the parts (N)", () => this.toggleNames(), "names");
+    this.namesButton = names;
+    this.walkOnly.push(step);
     place.append(
       button("reset", "Start again (R)", () => actions.reset(), "reset"), this.playButton, step,
       h("span", { class: "rate" }, h("label", { for: "rate" }, "speed"), this.rateInput, this.rateOutput),
-      push, view,
+      push, names, view,
     );
     this.showRate(0.4);
     this.listen(stage);
@@ -67,6 +72,12 @@ export class Transport {
   setWalk(isWalk: boolean): void {
     byId("touch").classList.toggle("off", !isWalk);
     this.walkOnly[0].hidden = !isWalk;
+  }
+
+  private toggleNames(): void {
+    const shown = this.namesButton.getAttribute("aria-pressed") !== "true";
+    this.namesButton.setAttribute("aria-pressed", String(shown));
+    this.actions.names(shown);
   }
 
   showPlaying(playing: boolean): void {
@@ -131,6 +142,10 @@ export class Transport {
         return true;
       case ".":
         actions.step();
+        return true;
+      case "n":
+      case "N":
+        this.toggleNames();
         return true;
     }
     return false;
