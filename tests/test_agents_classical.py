@@ -232,7 +232,7 @@ def test_actions_have_the_observations_shape_and_lie_in_the_action_space(task, s
 def test_the_gait_itself_is_answered_by_its_own_command():
     env = WalkerEnv("Heading", start_disturbance=0.0)
     seen, _ = env.reset(seed=0, options={"command": 0.0})
-    lqr = HeadingLqr(settings=LqrSettings(inter_leg_angle=0.3))
+    lqr = HeadingLqr("Heading", settings=LqrSettings(inter_leg_angle=0.3))
     # the start's mean heading is one footprint's, 0.0015 rad off the gait's
     assert np.abs(lqr.predict(seen)[0]).max() < 0.02
 

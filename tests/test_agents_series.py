@@ -9,10 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from typer.testing import CliRunner
 
 import train
-from agents.learning import series
+from agents.evaluation.episodes import Episodes, Results, metric_row
+from agents.learning import curves, series
 from agents.learning.curves import running_means
 from agents.learning.recorder import TrainingLog
 from agents.learning.runs import Training, is_finished, new_run, read_log
@@ -27,7 +29,7 @@ from agents.learning.series import (
     seeds_table,
 )
 from agents.policies import policy_files
-from agents.registry import newest_policy
+from agents.registry import agent_colour, newest_policy
 from agents.shipping import ship
 
 # the least that PPO's own settings for the task allow: one update
@@ -72,6 +74,27 @@ def test_curves_of_steady_trainings_are_their_returns_where_all_have_some():
     assert means == pytest.approx(np.array([[3.0], [5.0]]) * np.ones(len(steps)))  # rounding
     steps, means = running_means([short, log_of([], [])])
     assert means.shape == (2, 0)
+
+
+def test_levels_of_a_learning_curve_have_their_agents_colours(monkeypatch, tmp_path):
+    drawn = []
+    monkeypatch.setattr(curves, "save_figure", lambda figure, path: drawn.append(figure))
+    levels = {"fixed": 1.0, "lqr": 2.0}
+    log = log_of(list(range(1000)), [3.0] * 1000)
+    rows = [
+        metric_row(
+            Results("Heading", agent, (Episodes(np.ones(4, bool), {"return": np.full(4, value)}),)),
+            "return",
+        )
+        for agent, value in {**levels, "ppo": 3.0}.items()
+    ]
+    curves.save_learning_curve(log, rows, "ppo", "title", 1000, tmp_path / "one.png")
+    curves.save_seeds_curves([log, log], "ppo", ("ppo", 3.0), levels, "title", 1000, tmp_path)
+    for figure in drawn:
+        lines = {line.get_label().split(",")[0].strip(): line for line in figure.axes[0].lines}
+        for name in ("fixed", "lqr", "ppo"):
+            assert to_rgb(lines[name].get_color()) == agent_colour(name)
+        assert len({lines[name].get_linestyle() for name in levels}) == 2
 
 
 def test_a_series_goes_on_with_what_is_unfinished_and_gathers_its_seeds(tmp_path, monkeypatch):

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from lean_yaw_env.envs.formulas import wrapped
 from lean_yaw_env.envs.observation import OFFSET_SCALE
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.validation import require_number
 
-from ..agent import State
 from ..observations import ObservationLayout
-from ..settings import tuned
-from .lqr import HeadingLqr, LqrLoop, LqrSettings, UprightLqr
+from .lqr import HeadingLqr, LqrSettings, Regulator, UprightLqr
 
 _PREVIEW = "preview_"
 
@@ -43,53 +43,23 @@ class PathSettings:
         require_number("approach", self.approach, 0.0, math.inf, "()")
 
 
-class PathGuidance:
-    """Follows a path that is seen ahead: its direction there, and towards it as far as the walker is beside it.
+class PathGuidance(Regulator):
+    """Follows a path that is seen ahead: its direction there, and towards it as far as the walker is beside it; see ``Regulator``.
 
-    The path ahead is the polynomial through where it is beside the walker, its direction there, and its previews. It remembers nothing.
-
-    Parameters
-    ----------
-    task : str
-        A task that shows a path.
-    options : EnvOptions
-        Those of the environment.
-    settings : PathSettings
-
-    Raises
-    ------
-    ValueError
-        If the task shows no path.
-    NoGaitError
-        If the walker has no gait down its slope.
+    The path ahead is the polynomial through where it is beside the walker, its direction there, and its previews.
     """
 
     Settings = PathSettings
+    needs = ("cross_track_error", "path_heading_error")
 
-    def __init__(
-        self,
-        task: str = "Slalom",
-        options: EnvOptions | None = None,
-        settings: PathSettings | None = None,
-    ) -> None:
-        chosen = EnvOptions() if options is None else options
-        ObservationLayout.of(task, chosen, needs=("cross_track_error", "path_heading_error"))
-        self._settings = tuned("lqr", task, PathSettings()) if settings is None else settings
-        self._loop = LqrLoop(task, chosen, self._settings.loop)
-        names = [name for name in self._loop.layout.names if name.startswith(_PREVIEW)]
+    def __init__(self, task: str, options: EnvOptions | None = None, settings: Any = None) -> None:
+        super().__init__(task, options, settings)
+        names = [name for name in self.loop.layout.names if name.startswith(_PREVIEW)]
         self._previews = [(name, float(name.removeprefix(_PREVIEW))) for name in names]
         self._slope_ahead = self._slope_weights()
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: State = None,
-        episode_start: NDArray[np.bool_] | None = None,
-        deterministic: bool = True,
-    ) -> tuple[NDArray[np.float32], State]:
-        """Actions along the path; see ``Agent.predict``."""
-        layout = self._loop.layout
-        seen = layout.require(observation)
+    def _actions(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
+        layout = self.loop.layout
         heading = self._mean_heading(seen)
         aside = layout.quantity(seen, "cross_track_error")
         path_heading = heading + layout.quantity(seen, "path_heading_error")
@@ -99,14 +69,14 @@ class PathGuidance:
             left = layout.quantity(seen, name)
             points.append(-(left + ahead * np.sin(heading)) / np.cos(heading))
         there = np.stack(points, axis=-1) @ self._slope_ahead
-        wanted = -np.arctan(there) + np.arctan(aside / self._settings.approach)
-        return self._loop.actions(seen, wanted - heading), None
+        wanted = -np.arctan(there) + np.arctan(aside / self.settings.approach)
+        return self.loop.actions(seen, wanted - heading)
 
     def _mean_heading(self, seen: NDArray[np.float32]) -> Vector:
         """Of the last two footprints, within what previews can be turned back from."""
-        layout = self._loop.layout
+        layout = self.loop.layout
         heading = layout.quantity(seen, "heading")
-        turned = self._loop.last_turn(seen)
+        turned = self.loop.last_turn(seen)
         return np.clip(heading - 0.5 * turned, -1.4, 1.4)
 
     def _slope_weights(self) -> Vector:
@@ -116,7 +86,7 @@ class PathGuidance:
         conditions = np.vstack(
             [0.0**powers, np.where(powers == 1, 1.0, 0.0), distances[:, None] ** powers]
         )
-        ahead = self._settings.ahead
+        ahead = self.settings.ahead
         slope = np.where(powers > 0, powers * ahead ** np.maximum(powers - 1, 0), 0.0)
         return np.asarray(slope @ np.linalg.inv(conditions), dtype=float)
 
@@ -145,69 +115,27 @@ class WaypointSettings:
         require_number("persistence", self.persistence, 0.0, math.pi)
 
 
-class WaypointGuidance:
-    """Walks to goals, past those that it cannot turn to, and back. It remembers nothing.
-
-    Parameters
-    ----------
-    task : str
-        A task that shows a goal.
-    options : EnvOptions
-        Those of the environment.
-    settings : WaypointSettings
-
-    Raises
-    ------
-    ValueError
-        If the task shows no goal.
-    NoGaitError
-        If the walker has no gait down its slope.
-    """
+class WaypointGuidance(Regulator):
+    """Walks to goals, past those that it cannot turn to, and back; see ``Regulator``."""
 
     Settings = WaypointSettings
+    needs = ("goal_bearing", "goal_distance")
 
-    def __init__(
-        self,
-        task: str = "Waypoint",
-        options: EnvOptions | None = None,
-        settings: WaypointSettings | None = None,
-    ) -> None:
-        chosen = EnvOptions() if options is None else options
-        ObservationLayout.of(task, chosen, needs=("goal_bearing", "goal_distance"))
-        self._settings = tuned("lqr", task, WaypointSettings()) if settings is None else settings
-        self._loop = LqrLoop(task, chosen, self._settings.loop)
-
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: State = None,
-        episode_start: NDArray[np.bool_] | None = None,
-        deterministic: bool = True,
-    ) -> tuple[NDArray[np.float32], State]:
-        """Actions to the goal; see ``Agent.predict``."""
-        layout = self._loop.layout
-        seen = layout.require(observation)
+    def _actions(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
+        layout = self.loop.layout
         bearing = layout.quantity(seen, "goal_bearing")
         distance = layout.quantity(seen, "goal_distance")
         # a circle through here along the heading and through the goal has this radius: distance / (2 sin(bearing))
-        can_turn = distance >= 2.0 * self._settings.radius * np.abs(np.sin(bearing))
+        can_turn = distance >= 2.0 * self.settings.radius * np.abs(np.sin(bearing))
         error = np.where(can_turn, self._shortest_turn(seen, bearing), 0.0)
-        return self._loop.actions(seen, error), None
+        return self.loop.actions(seen, error)
 
     def _shortest_turn(self, seen: NDArray[np.float32], bearing: Vector) -> Vector:
         """The turn to a bearing on the side that the walker leans to, unless that is longer by more than leaning over is worth."""
         # an offset to the right (positive) turns to the right (negative)
-        lean = np.clip(-self._loop.layout.quantity(seen, "mass_offset") / OFFSET_SCALE, -1.0, 1.0)
-        preferred = self._settings.persistence * lean
-        return preferred + _wrapped(bearing - preferred)
-
-
-def _wrapped(angle: Vector) -> Vector:
-    """An angle's equal within half a turn."""
-    return angle - 2.0 * math.pi * np.round(angle / (2.0 * math.pi))
-
-
-Regulator = HeadingLqr | PathGuidance | UprightLqr | WaypointGuidance
+        lean = np.clip(-self.loop.layout.quantity(seen, "mass_offset") / OFFSET_SCALE, -1.0, 1.0)
+        preferred = self.settings.persistence * lean
+        return preferred + wrapped(bearing - preferred)
 
 
 def regulator_for(task: str, options: EnvOptions) -> type[Regulator]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lean_yaw_env.envs.formulas import wrapped
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, MIRROR, STATE_FIELDS, Vector
@@ -131,7 +133,7 @@ class LqrLoop:
         low, high = self.schedule.headings[[0, -1]]
         wanted = heading + error
         if high >= math.pi:
-            return error, wanted - 2.0 * math.pi * np.round(wanted / (2.0 * math.pi))
+            return error, wrapped(wanted)
         # no gait is known beyond the schedule's headings
         wanted = np.clip(wanted, low, high)
         return wanted - heading, wanted
@@ -167,82 +169,35 @@ def _deviation(gait: Scheduled, state: Vector, offset: Vector) -> Vector:
     return np.concatenate([rest, (offset - before)[..., None]], axis=-1)
 
 
-class HeadingLqr:
-    """Linear-quadratic regulator for tasks that command a heading, or a heading and a speed. It remembers nothing.
+class Regulator:
+    """What the regulators of all tasks have in common: the inner loop, and one answer to each observation. They remember nothing.
 
     Parameters
     ----------
     task : str
+        That shows what the regulator needs.
     options : EnvOptions
         Those of the environment.
-    settings : LqrSettings, optional
-        Those tuned for the task otherwise.
+    settings : of the class ``Settings``, optional
+        Those that come with the package for the task otherwise.
 
     Raises
     ------
     ValueError
-        If the task shows no heading error.
-    NoGaitError
-        If the walker has no gait down its slope.
-    """
-
-    Settings = LqrSettings
-
-    def __init__(
-        self,
-        task: str = "Heading",
-        options: EnvOptions | None = None,
-        settings: LqrSettings | None = None,
-    ) -> None:
-        chosen = EnvOptions() if options is None else options
-        names = ObservationLayout.of(task, chosen, needs=("heading_error",)).names
-        self._has_speed = "commanded_speed" in names
-        self.loop = LqrLoop(
-            task, chosen, tuned("lqr", task, LqrSettings()) if settings is None else settings
-        )
-
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: State = None,
-        episode_start: NDArray[np.bool_] | None = None,
-        deterministic: bool = True,
-    ) -> tuple[NDArray[np.float32], State]:
-        """Actions of the regulator; see ``Agent.predict``."""
-        layout = self.loop.layout
-        seen = layout.require(observation)
-        speed = layout.quantity(seen, "commanded_speed") if self._has_speed else None
-        return self.loop.actions(seen, layout.quantity(seen, "heading_error"), speed=speed), None
-
-
-class UprightLqr:
-    """Linear-quadratic regulator for tasks that command nothing: it keeps the walker in its gait, straight downhill. It remembers nothing.
-
-    Parameters
-    ----------
-    task : str
-    options : EnvOptions
-        Those of the environment.
-    settings : LqrSettings
-
-    Raises
-    ------
+        If the task does not show it.
     NoGaitError
         If the walker has no gait to regulate about.
     """
 
-    Settings = LqrSettings
+    Settings: ClassVar[type[Any]] = LqrSettings
+    needs: ClassVar[tuple[str, ...]] = ()
 
-    def __init__(
-        self,
-        task: str = "Push",
-        options: EnvOptions | None = None,
-        settings: LqrSettings | None = None,
-    ) -> None:
+    def __init__(self, task: str, options: EnvOptions | None = None, settings: Any = None) -> None:
         chosen = EnvOptions() if options is None else options
-        self.loop = LqrLoop(
-            task, chosen, tuned("lqr", task, LqrSettings()) if settings is None else settings
-        )
+        ObservationLayout.of(task, chosen, needs=self.needs)
+        self.settings = tuned("lqr", task, self.Settings()) if settings is None else settings
+        is_inner = isinstance(self.settings, LqrSettings)
+        self.loop = LqrLoop(task, chosen, self.settings if is_inner else self.settings.loop)
 
     def predict(
         self,
@@ -252,8 +207,28 @@ class UprightLqr:
         deterministic: bool = True,
     ) -> tuple[NDArray[np.float32], State]:
         """Actions of the regulator; see ``Agent.predict``."""
+        return self._actions(self.loop.layout.require(observation)), None
+
+    def _actions(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
+        raise NotImplementedError
+
+
+class HeadingLqr(Regulator):
+    """Linear-quadratic regulator for tasks that command a heading, or a heading and a speed; see ``Regulator``."""
+
+    needs = ("heading_error",)
+
+    def _actions(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
+        layout, command = self.loop.layout, "commanded_speed"
+        speed = layout.quantity(seen, command) if command in layout.names else None
+        return self.loop.actions(seen, layout.quantity(seen, "heading_error"), speed=speed)
+
+
+class UprightLqr(Regulator):
+    """Linear-quadratic regulator for tasks that command nothing: it keeps the walker in its gait, straight downhill; see ``Regulator``."""
+
+    def _actions(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
         loop = self.loop
-        seen = loop.layout.require(observation)
         # where the slope turns with the walker its heading is shown as zero, and any is as good
         mean = loop.layout.quantity(seen, "heading") - 0.5 * loop.last_turn(seen)
-        return loop.actions(seen, -mean), None
+        return loop.actions(seen, -mean)
