@@ -122,6 +122,20 @@ def test_a_fall_terminates_and_pays_nothing(task: str) -> None:
 
 
 @pytest.mark.parametrize("task", TASKS)
+def test_a_step_that_takes_no_time_leaves_numbers_numbers(task: str) -> None:
+    env = WalkerEnv(task, parameters={"early_contact": "strike"}, push_level=0.0)
+    # the swing foot, put in front, is below the floor at once
+    env.reset(seed=0, options={"state": [0.0, -0.3, 0.0, -0.5, 0.0], "stance": "left"})
+    observation, reward, terminated, _, info = env.step([1.0, 0.0])
+    assert not terminated
+    assert info["duration"] == 0.0
+    assert np.isfinite(observation).all()
+    assert all(np.isfinite(number).all() for number in info.values())
+    assert math.isfinite(reward)
+    assert info["speed"] == 0.0  # of no step yet
+
+
+@pytest.mark.parametrize("task", TASKS)
 def test_the_horizon_is_simulated_time_and_truncates(task: str) -> None:
     env = WalkerEnv(task, horizon=3.0, push_level=0.0, start_disturbance=0.0)
     env.reset(seed=0)
