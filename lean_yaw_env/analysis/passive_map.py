@@ -121,8 +121,9 @@ class PassiveMap(SectionMap):
     def linear_step(self, state: Vector, k: int, parameter: str | None) -> Linearised:
         size = PASSIVE_STATE_SIZE
         rows, after = np.empty((size, INPUTS)), np.empty(size)
-        status = passive_jacobian(self._body, state, SIDE[FEET_IN_TURN[k % 2]], after, rows)
-        raise_for_failure(status, state, self.walker.parameters)
+        side = SIDE[FEET_IN_TURN[k % 2]]
+        status = passive_jacobian(self._body, state, side, after, rows)
+        raise_for_failure(status, self._body, (np.nan,), state, side)
         if status != STEPPED:
             fall = fall_of(status, after[1])
             how = f"fell {fall.value}" if fall else "has no trailing foot on the floor"

@@ -49,7 +49,10 @@ TASK = replace(
     reward=reward,
     update=update,
     refresh=refresh,
-    metrics={"is_success": Metric("reached", None, "1 once the goal is reached", "higher", True)},
+    metrics={
+        "is_success": Metric("reached", None, "1 once the goal is reached", "higher", True),
+        "time": Metric("time", None, "when the episode ended"),
+    },
     summary="Walk to one place, as far and at any bearing as in Waypoint.",
     reward_text=f"none, but 1 for the step that comes within {RADIUS} of the goal",
     ends="the goal reached",
