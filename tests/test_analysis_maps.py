@@ -14,8 +14,7 @@ from lean_yaw_env.analysis import (
     gait_map,
     largest_disturbance,
     load_dataset,
-    load_map,
-    save_map,
+    save_dataset,
     section_map_of,
     stability_map,
 )
@@ -122,11 +121,11 @@ def test_interrupted_map_goes_on_where_it_was(tmp_path: Path, monkeypatch) -> No
     monkeypatch.setattr(gait_map, "gaits_at", interrupted)
     with pytest.raises(KeyboardInterrupt):
         stability_map(TABLE_1, AXES, path=path)
-    assert int((load_map(path).status != 0).sum()) == 5
+    assert int((load_dataset(path).status != 0).sum()) == 5
     resumed = stability_map(TABLE_1, AXES, path=path)
     # what was done is not done again: point 5 is the second width's second tilt
     assert (calls[2]["hip_width"][0], calls[2]["ankle_tilt"][0]) == (WIDTHS[1], TILTS[1])
-    assert resumed.identical(load_map(path))
+    assert resumed.identical(load_dataset(path))
     # other batches, other neighbours in a vector: bit for bit the same all the same
     assert resumed.equals(whole)
     assert [p.name for p in tmp_path.iterdir()] == ["map.nc"]
@@ -156,8 +155,8 @@ def test_what_is_done_is_kept_when_work_ends_in_an_error(tmp_path: Path, monkeyp
 def test_map_saves_and_loads_and_another_question_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "map.nc"
     result = stability_map(TABLE_1, {"slope": [0.01, 0.02]})
-    save_map(result, path)
-    assert load_map(path).identical(result)
+    save_dataset(result, path)
+    assert load_dataset(path).identical(result)
     with pytest.raises(ValueError, match="another question"):
         stability_map(TABLE_1, {"slope": [0.01, 0.03]}, path=path)
     with pytest.raises(ValueError, match="another question"):
@@ -165,9 +164,9 @@ def test_map_saves_and_loads_and_another_question_is_refused(tmp_path: Path) -> 
     broken = tmp_path / "broken.nc"
     broken.write_bytes(b"no map")
     with pytest.raises(ValueError, match="must be a netCDF file"):
-        load_map(broken)
+        load_dataset(broken)
     with pytest.raises(ValueError, match="path must be a file"):
-        load_map(tmp_path / "none.nc")
+        load_dataset(tmp_path / "none.nc")
 
 
 @pytest.mark.parametrize(

@@ -84,8 +84,11 @@ def basin(
     axes = {name: _axis(section_map, name, values) for name, values in (x, y)}
     if len(axes) != 2:
         raise ValueError(f"x and y must be different coordinates, got {x[0]!r} twice")
-    states = plane(section_map, middle, axes)
-    n = len(states)
+    grid = np.meshgrid(*axes.values(), indexing="ij")
+    n = grid[0].size
+    states = np.tile(middle, (n, 1))
+    for name, values in zip(axes, grid, strict=True):
+        states[:, section_map.names.index(name)] = values.ravel()
     result: dict[str, Vector] = {"steps": np.zeros(n), "ending": np.full(n, -1.0)}
     if cycle is not None:
         result["distance"] = np.full(n, np.nan)
@@ -108,15 +111,6 @@ def basin(
             counter.advance(some.size)
             saved.save_if_due()
     return dataset()
-
-
-def plane(section_map: SectionMap, centre: Vector, axes: dict[str, Vector]) -> Vector:
-    """States (n, k) over a grid of two coordinates' values, the others those of ``centre``; the second coordinate runs fastest."""
-    grid = np.meshgrid(*axes.values(), indexing="ij")
-    states = np.tile(centre, (grid[0].size, 1))
-    for name, values in zip(axes, grid, strict=True):
-        states[:, section_map.names.index(name)] = values.ravel()
-    return states
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,9 +41,6 @@ from lean_yaw_env.kernel.records import STEPPED, Command, Outcome
 from lean_yaw_env.parameters import STATE_FIELDS, STATE_SIZE, Foot, Vector, require_state
 from lean_yaw_env.validation import require_array, require_choice, require_count
 from lean_yaw_env.walker import Walker
-
-if TYPE_CHECKING:
-    pass
 
 OFFSET, MEMORY = STATE_SIZE, STATE_SIZE + 1
 """Where a state holds the mass offset in force, and the first coordinate of what else it remembers."""

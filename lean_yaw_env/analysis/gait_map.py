@@ -19,13 +19,7 @@ from lean_yaw_env.analysis.passive_map import PassiveMap
 from lean_yaw_env.analysis.path import distance_walked
 from lean_yaw_env.analysis.progress import Counter
 from lean_yaw_env.analysis.section_map import BODY_PARAMETERS, SectionMap, section_map_of
-from lean_yaw_env.analysis.storage import (
-    Progressing,
-    labelled,
-    load_dataset,
-    require_axis,
-    save_dataset,
-)
+from lean_yaw_env.analysis.storage import Progressing, labelled, require_axis
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.records import Body, Outcome
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector
@@ -128,16 +122,6 @@ def stability_map(
             fresh = _spread(grid, values, fresh, threads)
             saved.save_if_due()
     return dataset()
-
-
-def save_map(dataset: xarray.Dataset, path: str | Path) -> Path:
-    """Write a map to a netCDF file, whole or not at all."""
-    return save_dataset(dataset, path)
-
-
-def load_map(path: str | Path) -> xarray.Dataset:
-    """Read a map from a file; ``ValueError`` if it holds none."""
-    return load_dataset(path)
 
 
 class _Grid:
