@@ -25,6 +25,7 @@ from lean_yaw_env.parameters import (
 )
 from lean_yaw_env.threads import MOST_THREADS, share_out
 from lean_yaw_env.validation import require_count, require_one_or_each, require_shape
+from lean_yaw_env.walker import failure_of
 
 _REPEATS = 64  # of a row's ranges: the compiled check goes through so many rows at a time
 
@@ -166,9 +167,7 @@ def step_batch(
         workers,
     )
     result = BatchResult(outcomes)
-    failed = np.flatnonzero(result.status == records.FAILED)
-    if len(failed):
-        raise SolverError(
-            f"the step of walker {failed[0]} from {start[failed[0]].tolist()} did not converge"
-        )
+    for i in np.flatnonzero(result.status == records.FAILED)[:1]:
+        body, command = Body(*bodies[i % len(bodies)].tolist()), Command(*commands[i].tolist())
+        raise SolverError(f"walker {i}: {failure_of(body, command, start[i], float(side[i]))}")
     return result

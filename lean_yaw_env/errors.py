@@ -16,8 +16,8 @@ class NoGaitError(LeanYawError):
 
 
 class SolverError(LeanYawError):
-    """The integrator or the landing's solver gave up, which is a fault and not a fall; please report state and parameters.
+    """The integrator gave up, which is a fault of the solver and not a fall; please report the message, which reproduces it.
 
-    Known only of springs or dampers that move an ankle next to without inertia (hip width below 0.05, small ankle tilt) a thousand
+    Known only of springs or dampers that move an ankle next to without inertia (hip width below 0.05, small ankle tilt) more than a thousand
     times faster than it walks: soften them.
     """

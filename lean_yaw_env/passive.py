@@ -202,7 +202,11 @@ class PassiveWalker:
                 "inter_leg_angle", inter_leg_angle, -QUARTER_TURN, QUARTER_TURN, "()"
             )
         row = step_passive_rows(self, start[None], [SIDE[foot]], [angle])[0]
-        return _result(PassiveOutcome(*row.tolist()), foot, start, self.parameters)
+        outcome = PassiveOutcome(*row.tolist())
+        raise_for_failure(
+            outcome.status, self.moving_parameters.body(), (angle,), start, SIDE[foot]
+        )
+        return _result(outcome, foot, start)
 
     def walk(self, n_steps: int, *, state: ArrayLike, stance: Foot = "left") -> PassiveWalk:
         """Walk ``n_steps`` steps, or until a fall, from both feet on the floor.
@@ -333,15 +337,12 @@ def fall_of(status: float, stance_pitch: float) -> PassiveFall | None:
     return _FALL_OF_STATUS.get(status)
 
 
-def _result(
-    outcome: PassiveOutcome, foot: Foot, start: Vector, parameters: WalkerParameters
-) -> PassiveStep:
+def _result(outcome: PassiveOutcome, foot: Foot, start: Vector) -> PassiveStep:
     if outcome.status == records.TRIP:
         raise ValueError(
             f"state {start.tolist()} has no trailing swing foot on the floor: its stance_pitch "
             "must be positive and its lean within what the swing leg reaches"
         )
-    raise_for_failure(outcome.status, start, parameters)
     fall = fall_of(outcome.status, outcome.stance_pitch)
     return PassiveStep(
         state=np.array(outcome[:PASSIVE_STATE_SIZE]),

@@ -355,7 +355,9 @@ class Walker:
     def _step(self, state: Vector, foot: Foot, command: Command) -> StepResult:
         row = np.empty(len(Outcome._fields))
         step_kernel(self._body, np.array(command), state, SIDE[foot], row)
-        return _result(Outcome._make(row.tolist()), foot, state, self.parameters)
+        outcome = Outcome._make(row.tolist())
+        raise_for_failure(outcome.status, self.parameters.body(), command, state, SIDE[foot])
+        return _result(outcome, foot)
 
     def _trace(
         self, state: Vector, stance: Foot, command: Command, duration: float, samples: int
@@ -385,16 +387,31 @@ def require_completed(result: StepResult, what: str) -> StepResult:
     return result
 
 
-def raise_for_failure(status: float, state: Vector, parameters: WalkerParameters | Body) -> None:
+def raise_for_failure(
+    status: float,
+    body: Body,
+    command: Sequence[float],
+    state: Sequence[float] | Vector,
+    side: float,
+) -> None:
     """Raise ``SolverError`` if a kernel gave up."""
     if status == records.FAILED:
-        raise SolverError(f"the step from {state.tolist()} of {parameters} did not converge")
+        raise failure_of(body, command, state, side)
 
 
-def _result(
-    outcome: Outcome, foot: Foot, start: Vector, parameters: WalkerParameters
-) -> StepResult:
-    raise_for_failure(outcome.status, start, parameters)
+def failure_of(
+    body: Body, command: Sequence[float], state: Sequence[float] | Vector, side: float
+) -> SolverError:
+    """The error that says which step a kernel gave up on, with all that the step starts from."""
+    start = [float(value) for value in state]
+    row = (*body, *command, *start, side)
+    return SolverError(
+        f"the step on the {'left' if side > 0.0 else 'right'} foot from {start} did not converge; "
+        f"{body}, {command}; all of it as hexadecimal floats: {' '.join(float(x).hex() for x in row)}"
+    )
+
+
+def _result(outcome: Outcome, foot: Foot) -> StepResult:
     fall = FALL_OF_STATUS.get(outcome.status)
     return StepResult(
         state=np.array(outcome[:5]),

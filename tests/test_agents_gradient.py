@@ -375,7 +375,7 @@ def test_trained_policy_is_kept_and_loaded_as_any_other(tmp_path: Path):
 def test_every_task_has_settings_and_formulas():
     for task in TASK_VERSIONS:
         assert settings_for("apg", task).steps > 0
-    with pytest.raises(ValueError, match="task must be one of"):
+    with pytest.raises(ValueError, match="task of apg must be one of"):
         settings_for("apg", "Nothing")
 
 

@@ -169,3 +169,16 @@ def test_stepping_without_actions_is_refused():
         env.step_wait()
     with pytest.raises(ValueError, match=r"shape \(3, 2\)"):
         env.step(np.zeros((WALKERS, 3), dtype=np.float32))
+
+
+def test_it_draws_a_grid_of_walkers() -> None:
+    env = WalkerVecEnv(4, "LeanYaw/Heading-v0", render_mode="rgb_array")
+    env.seed(1)
+    env.reset()
+    env.step(np.zeros((4, 2), np.float32))
+    picture = env.render()
+    assert picture is not None
+    assert picture.shape == (720, 960, 3)
+    # the four look different
+    parts = {picture[y : y + 360, x : x + 480].tobytes() for y in (0, 360) for x in (0, 480)}
+    assert len(parts) == 4

@@ -180,8 +180,21 @@ def test_a_solver_s_failure_raises_and_is_no_fall() -> None:
     # An ankle next to without inertia on a damper a million times stiffer: no explicit integrator gets through
     body = WalkerParameters(hip_width=0.0, ankle_tilt=1e-3, ankle_damping=50.0)
     state = [0.0, 0.1, 0.1, -0.4, 0.1]
-    with pytest.raises(SolverError, match=r"walker 0 .* did not converge"):
+    with pytest.raises(SolverError, match=r"walker 0: the step .* did not converge"):
         step_batch(body, [state], 1.0)
     with pytest.raises(SolverError, match="did not converge"):
         Walker(body).step(state)
+
+
+def test_a_solver_s_failure_says_all_that_reproduces_it() -> None:
+    body = WalkerParameters(hip_width=0.0, ankle_tilt=1e-3, ankle_damping=50.0)
+    state = [1.0 / 3.0, 0.1, 0.1, -0.4, 0.1]
+    command = {"inter_leg_angle": 0.2, "mass_offset": 0.03, "previous_offset": 0.1 / 3.0}
+    with pytest.raises(SolverError) as caught:
+        Walker(body).step(state, stance="right", **command)
+    numbers = str(caught.value).rsplit(": ", 1)[1].split()
+    given = [*body.body(), *command.values(), *state, -1.0]
+    # in the order of a command's fields
+    given[11:14] = [0.2, 0.03, 0.1 / 3.0]
+    assert [float.fromhex(number) for number in numbers] == given
     assert records.FAILED not in (records.STEPPED, records.BACKWARD)

@@ -117,7 +117,7 @@ def test_skateboard_prints_equation_3() -> None:
 
 def test_reproduce_writes_a_report(tmp_path: Path) -> None:
     record = _json("reproduce", "table1", "--out", str(tmp_path / "new"))
-    assert record["counts"]["agrees within rounding"] == 4
+    assert record["counts"]["agrees"] == 4
     assert (tmp_path / "new" / "report.html").is_file()
     assert (tmp_path / "new" / "report.md").is_file()
 

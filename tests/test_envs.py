@@ -130,6 +130,16 @@ def _walk(env: gym.Env[Any, Any], steps: int = 100) -> list[Any]:
     return seen
 
 
+def test_a_made_environment_is_copied_with_its_wrappers_and_its_spec() -> None:
+    env = gym.make("LeanYaw/Heading-v0", max_episode_steps=10)
+    env.reset(seed=1)
+    env.step(ZERO)
+    for other in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
+        assert other.spec == env.spec
+        assert other.unwrapped.spec == env.unwrapped.spec is not None
+        assert _same(_walk(other, 20), _walk(copy.deepcopy(env), 20))
+
+
 @pytest.mark.parametrize("how", ["copy", "deepcopy", "pickle", "set_state", "another's set_state"])
 @pytest.mark.parametrize("task", TASK_VERSIONS)
 def test_a_copied_episode_goes_on_bit_for_bit(task: str, how: str) -> None:

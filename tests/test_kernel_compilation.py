@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from lean_yaw_env import Walker
-from lean_yaw_env.kernel import compilation, fusing
+from lean_yaw_env.kernel import compilation, fusing, notice
 from lean_yaw_env.parameters import Vector
 
 ROOT = Path(compilation.__file__).parents[2]
@@ -82,7 +82,7 @@ def package(tmp_path: Path) -> Path:
         folder.mkdir(parents=True)
     for folder in (root, kernel, root / "envs", tasks):
         (folder / "__init__.py").write_text("")
-    for module in (compilation, fusing):
+    for module in (compilation, fusing, notice):
         shutil.copy(str(module.__file__), kernel)
     _write_formulas(root, 1.0, 10.0)
     (kernel / "entry.py").write_text(

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from numba import njit
 
 from lean_yaw_env import Fall, Walker, WalkerParameters
 from lean_yaw_env.batch import step_batch
 from lean_yaw_env.kernel import records
 from lean_yaw_env.kernel.flight import BACKWARD_RATE, MOST_ATTEMPTS
 from lean_yaw_env.kernel.records import Body
+from lean_yaw_env.kernel.step import body_of, command_of, walk_carefully, write_outcome
 from lean_yaw_env.parameters import Vector
 from tests.reference import ReferenceWalker
 
@@ -253,3 +256,116 @@ def test_the_least_normal_force_is_missed_by_little(
     assert min(misses) > -miss
     assert max(misses) < miss
     assert max(friction_misses) < 3 * miss
+
+
+# --- landings that graze the floor
+
+
+GRAZES: dict[str, tuple[WalkerParameters, list[float], dict[str, Any]]] = {
+    # a gap that was never open by more than a thousandth: its quintic's root is off by 0.004
+    "low arc": (
+        WalkerParameters(),
+        [0.08701609192211816, 0.0011395946107252142, 0.03551927686193307, -1.0638458784542566, -0.598656327897991],
+        {"inter_leg_angle": 0.15},
+    ),
+    # a gap that closes all but flat: its rate at the landing is 1e-4
+    "flat": (
+        WalkerParameters(slope=0.0),
+        [0.47132556896791544, 0.029622014849751466, -0.05449929791874009, -0.5886643357159876, 0.024657241249324186],
+        {
+            "stance": "right", "inter_leg_angle": 0.19524551331996917,
+            "mass_offset": -0.05, "previous_offset": -0.010680655390024187,
+        },
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", GRAZES)
+def test_a_landing_that_all_but_grazes_is_found(name: str) -> None:
+    parameters, state, options = GRAZES[name]
+    walker = Walker(parameters)
+    result = walker.step(state, **options)
+    assert result.fall is None
+    # the foot was above the floor until it was down
+    motion = walker.stance_motion(state, duration=result.duration, samples=200, **options)
+    reference = ReferenceWalker(slope=parameters.slope)
+    side = -1.0 if options.get("stance") == "right" else 1.0
+    poses = zip(motion["stance_pitch"], motion["ankle_angle"], strict=True)
+    heights = [
+        reference.swing_foot(state[0], *pose, options["inter_leg_angle"], side)[0][1] - 0.5
+        for pose in poses
+    ]
+    # the integrator's error
+    assert abs(heights[-1]) < 1e-11
+    assert min(heights[:-1]) > 0.0
+
+
+@pytest.mark.parametrize("name", GRAZES)
+def test_no_neighbour_of_a_landing_that_all_but_grazes_fails(name: str) -> None:
+    parameters, state, options = GRAZES[name]
+    near = np.array(state) + np.random.default_rng(0).uniform(-1e-6, 1e-6, (200, 5))
+    results = [Walker(parameters).step(each, **options) for each in near]
+    assert all(result.fall is None for result in results)
+    side = -1.0 if options.get("stance") == "right" else 1.0
+    many = {f"{name}s": value for name, value in options.items() if name != "stance"}
+    together = step_batch(parameters, near, side, **many)
+    assert (together.states == [result.state for result in results]).all()
+
+
+def test_a_dip_to_the_floor_is_a_touch_and_one_above_it_is_none_with_nothing_between() -> None:
+    # with more of an inter-leg angle the foot passes over the floor where it would have touched, and lands a second time
+    walker = Walker(WalkerParameters(hip_width=0.75, foot_radius=0.93, ankle_tilt=0.2, slope=0.36))
+    state = [-0.28, 0.183, -0.005, -0.433, -0.079]
+    touches, passes = 0.43, 0.45
+    while touches < 0.5 * (touches + passes) < passes:
+        middle = 0.5 * (touches + passes)
+        if walker.step(state, inter_leg_angle=middle).duration < 0.9:
+            touches = middle
+        else:
+            passes = middle
+    early = walker.step(state, inter_leg_angle=touches)
+    late = walker.step(state, inter_leg_angle=passes)
+    assert (early.fall, late.fall) == (None, None)
+    assert late.duration > early.duration + 0.3
+    # the foot that touches does so at the lowest point of its dip
+    motion = walker.stance_motion(
+        state, duration=late.duration, samples=20_000, inter_leg_angle=passes
+    )
+    reference = ReferenceWalker(0.75, 0.93, 0.2, 0.36)
+    around = np.searchsorted(motion["time"], early.duration) + np.arange(-60, 60)
+    heights = [
+        reference.swing_foot(
+            state[0], motion["stance_pitch"][i], motion["ankle_angle"][i], passes, 1.0
+        )[0][1]
+        - 0.93
+        for i in around
+    ]
+    # the quintic that sees the dip is right to 1e-7 over this integrator step
+    assert abs(min(heights)) < 1e-6
+    assert abs(motion["time"][around[np.argmin(heights)]] - early.duration) < 5e-3
+
+
+def test_the_careful_way_finds_what_the_fast_one_does(gait: Vector) -> None:
+    bodies, states, sides, commands = _random_walkers(2_000, 9)
+    fast = step_batch(bodies, states, sides, **commands).outcomes
+    careful = np.empty_like(fast)
+    columns = [commands[k] for k in ("inter_leg_angles", "mass_offsets", "previous_offsets")]
+    _step_carefully(bodies, np.column_stack(columns), states, sides, careful)
+    status = records.Outcome._fields.index("status")
+    same = fast[:, status] == careful[:, status]
+    # falls are judged where integrator steps end, which lie elsewhere: of those that roll back or take too long, some are told apart otherwise
+    assert same.mean() > 0.99
+    stepped = same & (fast[:, status] == records.STEPPED)
+    assert stepped.sum() > 200
+    # both are right to some 1e-10
+    assert np.abs(fast[stepped, :7] - careful[stepped, :7]).max() < 1e-9
+
+
+@njit(error_model="numpy")
+def _step_carefully(bodies, commands, states, sides, outcomes):
+    for i in range(len(states)):
+        state = records.SectionState(
+            states[i, 0], states[i, 1], states[i, 2], states[i, 3], states[i, 4]
+        )
+        outcome = walk_carefully(body_of(bodies[i]), command_of(commands[i]), state, sides[i])
+        write_outcome(outcome, outcomes[i])

@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 from lean_yaw_env.paper import (
+    CLASSICS,
     NAMES,
+    PAPER,
     PIECES,
     Check,
     PaperNumber,
@@ -19,6 +21,7 @@ from lean_yaw_env.paper import (
     Reproduced,
     Reproduction,
     Result,
+    Section,
     Statement,
     as_html,
     as_markdown,
@@ -74,17 +77,27 @@ def test_a_number_agrees_within_half_a_unit_of_its_last_printed_digit(
 
 
 def test_an_approximate_number_agrees_within_its_stated_room_and_says_so() -> None:
-    about = PaperNumber("x", "0.72", "Figure 13", "critical speed", about=0.03)
+    about = PaperNumber("x", "0.72", "Figure 13", "critical speed", 0.02, "read off a figure")
     check = compare(about, 0.705)
     assert check.verdict == "agrees"
-    assert "3%" in check.remark
+    assert check.allowed == "± 0.02: read off a figure"
     assert compare(about, 0.69).verdict == "differs"
 
 
-def test_a_number_that_was_not_rounded_gets_no_room_from_its_digits() -> None:
-    ratio = PaperNumber("ratio", "1", "section 4.3", "ratio", about=0.1, is_rounded=False)
+def test_a_tolerance_of_its_own_leaves_a_number_no_room_from_its_digits() -> None:
+    ratio = PaperNumber("ratio", "1", "section 4.3", "ratio", 0.1, "one of four data points")
     assert compare(ratio, 0.93).verdict == "agrees"
     assert compare(ratio, 0.54).verdict == "differs"
+    # A printed 0 among values of two decimals is no 0.4
+    zero = PaperNumber("λ3", "0", "Table 3", "zero", 0.005, "the others have two decimals")
+    assert compare(zero, 0.4).verdict == "differs"
+    assert compare(PaperNumber("r", "0.5", "Table 1", "r", 0.0, "exact"), 0.5).verdict == "agrees"
+
+
+def test_a_tolerance_needs_a_reason_and_a_reason_a_tolerance() -> None:
+    for tolerance, reason in ((0.1, ""), (None, "about")):
+        with pytest.raises(ValueError, match="speed"):
+            PaperNumber("speed", "1", "here", "speed", tolerance, reason)
 
 
 def test_every_disagreement_says_something() -> None:
@@ -93,7 +106,7 @@ def test_every_disagreement_says_something() -> None:
     with pytest.raises(ValueError, match="basin"):
         judge(_STATEMENT, False, ours="small")
     with pytest.raises(ValueError, match="verdict must be one of"):
-        Check("a", "b", "c", "d", "e", None, "agrees a bit")  # pyright: ignore[reportArgumentType]
+        Check("a", "b", "c", "d", "e", None, "f", "agrees a bit")  # pyright: ignore[reportArgumentType]
 
 
 def test_ours_is_shown_with_two_digits_more_than_the_paper() -> None:
@@ -106,7 +119,10 @@ def test_pieces_are_unique_complete_and_in_the_papers_order() -> None:
     assert len(set(NAMES)) == len(NAMES)
     wanted = {f"table{i}" for i in (1, 2, 3)} | {f"figure{i}" for i in (4, *range(7, 16))}
     assert wanted <= set(NAMES)
-    assert pieces_named(["all"]) == PIECES
+    paper, classics = pieces_named(["all"]), pieces_named(["classics"])
+    assert {piece.group for piece in paper} == {PAPER}
+    assert {piece.group for piece in classics} == {CLASSICS}
+    assert pieces_named(["classics", "all"]) == paper + classics == PIECES
     assert [p.name for p in pieces_named(["table2", "table1", "table2"])] == ["table1", "table2"]
 
 
@@ -141,7 +157,9 @@ def _sample(tmp_path: Path) -> Reproduction:
         judge(_STATEMENT, True, ours="large"),
     )
     piece = Piece("one", "The <first>", lambda: Result(checks))
-    return Reproduction((Reproduced(piece, Result(checks, {"one": {"a": [1]}}), picture),))
+    section = Section("What was <tried>", "Nothing helped.", {"tried": ["r | α"], "λ": ["0.5"]})
+    result = Result(checks, {"one": {"a": [1]}}, sections=(section,))
+    return Reproduction((Reproduced(piece, result, picture),))
 
 
 def test_the_page_is_well_formed_and_needs_no_other_file(tmp_path: Path) -> None:
@@ -153,16 +171,20 @@ def test_the_page_is_well_formed_and_needs_no_other_file(tmp_path: Path) -> None
     assert {link.removeprefix("#") for link in page.links} <= page.anchors
     assert "The &lt;first&gt;" in text
     assert "5 &lt; 6 &amp; |λ| differ" in text
+    assert "What was &lt;tried&gt;" in text
+    assert "<td>r | α</td>" in text
 
 
 def test_the_markdown_has_a_row_for_each_check_and_one_more_for_each_disagreement(
     tmp_path: Path,
 ) -> None:
     text = as_markdown(_sample(tmp_path))
-    rows = [line for line in text.splitlines() if line.startswith("| ") and "what" not in line]
+    rows = [line for line in text.splitlines() if line.startswith(("| speed", "| basin"))]
     assert len(rows) == 3
     # A bar within a cell would split it
-    assert all(len(re.findall(r"(?<!\\)\|", row)) == 8 for row in rows)
+    assert all(len(re.findall(r"(?<!\\)\|", row)) == 9 for row in rows)
+    assert "### What was <tried>" in text
+    assert "| r \\| α | 0.5 |" in text
     assert "2 checks: 1 agrees, 0 agrees within rounding, 1 differs, 0 open." in text
 
 
@@ -172,6 +194,7 @@ def test_a_reproduction_leaves_report_pictures_and_numbers_and_no_scraps(tmp_pat
     assert [each.piece.name for each in done.pieces] == ["skateboard", "figure4", "table1"]
     assert {path.name for path in tmp_path.iterdir()} == {
         "figure4.png",
+        "skateboard.png",
         "figure4.csv",
         "table1.csv",
         "checks.csv",

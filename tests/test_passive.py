@@ -176,6 +176,19 @@ def test_derivative_by_a_parameter_agrees_with_differences_of_steps(parameter: s
 # --- published numbers
 
 
+@pytest.mark.parametrize(
+    ("radius", "slope"), [(0.4, 0.0003), (0.7, 0.015), (0.5, 0.00058), (0.0, 0.009)]
+)
+def test_passive_walkers_have_two_gaits_in_which_the_leg_swings_once(
+    radius: float, slope: float
+) -> None:
+    # others exist, whose leg swings to and fro once more (a step of 10.1) or round, and are no simple gaits
+    long, short = find_passive_gaits(
+        PassiveWalker(WalkerParameters(0.0, radius, 0.5, slope), planar=True)
+    )
+    assert short.stride_period < long.stride_period < 1.5 * short.stride_period
+
+
 def test_gaits_of_the_simplest_walker_match_garcia_1998() -> None:
     walker = PassiveWalker(WalkerParameters(0.0, 0.0, 0.5, 0.009), planar=True)
     long, short = find_passive_gaits(walker)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -134,13 +135,14 @@ print(seen.shape, float(first[1]), 0.3 <= info["wanted"] <= 0.5, sum(judge.stats
 
 
 def test_a_task_of_another_package_is_one_file_and_is_kept_compiled(tmp_path: Path) -> None:
-    own, cache = tmp_path / "own_task.py", str(tmp_path / "cache")
+    own = tmp_path / "own_task.py"
+    bonus = 1.0 + 1e-12 * (time.time_ns() % 10**9)  # a formula that was never compiled before
 
     def use() -> list[str]:
         done = subprocess.run(
             [sys.executable, "-c", _USE_IT],
             cwd=ROOT,
-            env={**os.environ, "PYTHONPATH": f"{tmp_path}:{ROOT}", "NUMBA_CACHE_DIR": cache},
+            env={**os.environ, "PYTHONPATH": f"{tmp_path}:{ROOT}"},
             capture_output=True,
             text=True,
             check=False,
@@ -148,13 +150,13 @@ def test_a_task_of_another_package_is_one_file_and_is_kept_compiled(tmp_path: Pa
         assert done.returncode == 0, done.stderr
         return done.stdout.split()
 
-    own.write_text(_OWN_TASK)
+    own.write_text(_OWN_TASK.replace("BONUS = 1.0", f"BONUS = {bonus!r}"))
     *first, hits = use()
     assert first[0] == "(7,)"
     assert (first[-1], hits) == ("True", "0")
     assert use() == [*first, "1"]
     # its formulas are part of what the machine code is kept by
-    own.write_text(_OWN_TASK.replace("BONUS = 1.0", "BONUS = 2.0"))
+    own.write_text(_OWN_TASK.replace("BONUS = 1.0", f"BONUS = {bonus + 1.0!r}"))
     *other, hits = use()
     assert hits == "0"
     assert float(other[1]) > float(first[1])

@@ -17,7 +17,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import lean_yaw_env  # noqa: F401  registers the environments
 from lean_yaw_env import Walker, WalkerParameters, find_limit_cycle
-from lean_yaw_env.envs.describe import INFO_MEANINGS, OPTIONAL_INFO_MEANINGS, renewed
+from lean_yaw_env.envs.describe import INFOS, OPTIONAL_INFOS, renewed
 from lean_yaw_env.envs.dynamics import ANKLE_PUSH, PITCH_PUSH
 from lean_yaw_env.envs.formulas import mean_heading, place
 from lean_yaw_env.envs.info import FallCode
@@ -143,8 +143,9 @@ def test_observations_and_metrics_are_what_the_task_names(task: str) -> None:
     assert len(set(names)) == len(names)
     assert observation.shape == (len(names),)
     assert all(math.isfinite(info[name]) for name in env.task.metrics)
-    assert set(info) - set(env.task.metrics) <= {*INFO_MEANINGS, *OPTIONAL_INFO_MEANINGS}
-    assert set(info) >= set(INFO_MEANINGS)
+    always, described = ({each.key for each in some} for some in (INFOS, (*INFOS, *OPTIONAL_INFOS)))
+    assert set(info) - set(env.task.metrics) <= described
+    assert set(info) >= always
 
 
 @pytest.mark.parametrize("task", TASKS)

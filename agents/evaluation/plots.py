@@ -56,9 +56,17 @@ def _draw_headline(axes: Axes, rows: Sequence[Row], task: str, headline: str) ->
         colour = agent_colour(row.agent)
         value, low, high = estimate(row, mean=share)
         axes.plot([low, high], [place, place], color=colour, linewidth=3.0, alpha=0.6, solid_capstyle="butt")  # fmt: skip
-        axes.plot(value, place, "o", color=colour, markersize=5)
+        axes.plot(value, place, "o", color=colour, markersize=5, clip_on=False)
         if not share:
-            axes.plot(row.mean, place, "o", markerfacecolor="none", color=colour, markersize=8)
+            axes.plot(
+                row.mean,
+                place,
+                "o",
+                markerfacecolor="none",
+                color=colour,
+                markersize=8,
+                clip_on=False,
+            )
         if row.trainings > 1:
             ends = [row.least_training, row.greatest_training]
             axes.plot(ends, [place, place], "|", color=colour, markersize=9)

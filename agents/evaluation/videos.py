@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-import sys
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.pictures import Footage
 from lean_yaw_env.envs.state import Records
 from lean_yaw_env.envs.walker_env import WalkerEnv
-from lean_yaw_env.files import require_ending, written_whole
 from lean_yaw_env.parameters import Foot, Vector
 from lean_yaw_env.rendering.filming import (
     SECONDS_PER_TIME_UNIT,
+    FilmFile,
     Frame,
-    gif_rate,
-    gif_writer,
-    mp4_writer,
     swing_angle,
 )
 from lean_yaw_env.rendering.geometry import Pose
@@ -45,8 +38,6 @@ SECONDS = 11.0
 SPEED = 2.0
 """Times as fast as a walker of a metre's leg on earth."""
 SWING_SHARE = 0.6
-HOLD_SECONDS = 1.0
-"""How long a film stays with a walker that has fallen."""
 STAND_INS = ("lqr", "feedback", "fixed")
 """Who is filmed where there is no trained agent, the first that is for the task."""
 DIAL_RADIUS = 22.0
@@ -129,27 +120,21 @@ def film_agent(
     gymnasium.error.DependencyNotInstalled
         If what draws or writes is not installed.
     """
-    place = require_ending(path, (".gif", ".mp4"))
     require_number("seconds", seconds, 0.0, 600.0, "(]")
     require_number("speed", speed, 0.0, 100.0, "(]")
     require_number("fps", fps, 1.0, 60.0)
-    is_gif = place.suffix.lower() == ".gif"
-    write, rate = (gif_writer(), gif_rate(fps)) if is_gif else (mp4_writer(), float(fps))
+    file = FilmFile(path, fps)
     renderer = Renderer(size)
     per_second = speed / SECONDS_PER_TIME_UNIT
     steps = record_steps(
         agent, task, seed=evaluation_seed(seed), options=options, time=seconds * per_second
     )
     ends = np.array([step.end for step in steps])
-    times = np.arange(0.0, min(ends[-1], seconds * per_second), per_second / rate)
+    times = np.arange(0.0, min(ends[-1], seconds * per_second), per_second / file.rate)
     scenes = (_scene_at(steps, ends, time, name) for time in times)
-    frames: Iterable[Frame] = (draw_push(renderer.frame(scene), push) for scene, push in scenes)
+    frames = (draw_push(renderer.frame(scene), push) for scene, push in scenes)
     fall = steps[-1].fall if ends[-1] <= seconds * per_second else None
-    frames = _held(frames, round(HOLD_SECONDS * rate) if fall else 0)
-    if progress:
-        frames = tqdm(frames, total=len(times), desc=place.name, unit="frame", file=sys.stderr)
-    with written_whole(place) as temporary:
-        write(temporary, frames, rate, renderer.size)
+    file.write(frames, len(times), holds_last=fall is not None, progress=progress)
     return fall
 
 
@@ -252,15 +237,6 @@ def _scene_at(
     now = f"falls: {step.fall}" if step.fall else f"time {time:.0f}"
     lines = (name, now) if name else (now,)  # more of them would hide the walker of a small picture
     return replace(step.scene, pose=pose, path=path, lines=lines), step.push
-
-
-def _held(frames: Iterable[Frame], count: int) -> Iterator[Frame]:
-    """The frames, the last one so many times more."""
-    last: Frame | None = None
-    for last in frames:
-        yield last
-    if last is not None:
-        yield from itertools.repeat(last, count)
 
 
 def agent_for(name: str, task: str, runs: Path, path: Path | None = None) -> tuple[str, Agent]:

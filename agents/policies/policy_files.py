@@ -11,7 +11,7 @@ from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.files import read_json, write_json, written_whole
 from lean_yaw_env.parameters import WalkerParameters
-from lean_yaw_env.registration import ALL_ENV_IDS, NAMESPACE
+from lean_yaw_env.registration import ALL_ENV_IDS, NAMESPACE, TASK_IDS
 
 from ..observations import ObservationLayout
 from .policy import Policy, PolicyCard, require_algorithm
@@ -177,7 +177,7 @@ def require_env_id(env_id: str) -> str:
 
 def task_of(env_id: str) -> str:
     """The task's name in an environment's id."""
-    return env_id.removeprefix(f"{NAMESPACE}/").partition("-v")[0]
+    return TASK_IDS.get(env_id) or env_id.removeprefix(f"{NAMESPACE}/").partition("-v")[0]
 
 
 def options_to_plain(options: EnvOptions) -> dict[str, Any]:

@@ -123,8 +123,8 @@ def stability_map(
                 values[name][chunk] = rows
             counter.advance(chunk.size)
             saved.save_if_due()
-        fresh = values["status"] == FOUND
-        while fresh.any():
+        fresh = np.flatnonzero(values["status"] == FOUND)
+        while fresh.size:
             fresh = _spread(grid, values, fresh, threads)
             saved.save_if_due()
     return dataset()
@@ -331,29 +331,28 @@ def _columns(
 
 
 def _spread(
-    grid: _Grid, values: Columns, fresh: NDArray[np.bool_], threads: int
-) -> NDArray[np.bool_]:
-    """Try points without a gait from neighbours that have just got one; which points (n,) were found."""
-    number = np.arange(grid.n).reshape(grid.shape)
-    index, guess_from = [], []
-    for axis in range(len(grid.shape)):
-        for ahead in (1, -1):
-            here = np.take(number, range(grid.shape[axis] - 1), axis=axis).ravel()
-            there = np.take(number, range(1, grid.shape[axis]), axis=axis).ravel()
-            here, there = (here, there) if ahead > 0 else (there, here)
-            tries = (values["status"][here] == NONE_FOUND) & fresh[there]
-            index.append(here[tries])
-            guess_from.append(there[tries])
-    points, first = np.unique(np.concatenate(index), return_index=True)
+    grid: _Grid, values: Columns, fresh: NDArray[np.intp], threads: int
+) -> NDArray[np.intp]:
+    """Try the neighbours, where none was found, of points that have just got a gait; those found."""
+    places = np.array(np.unravel_index(fresh, grid.shape))
+    tried, guess_from = [], []
+    for axis, size in enumerate(grid.shape):
+        for step in (-1, 1):
+            there = places.copy()
+            there[axis] += step
+            inside = (there[axis] >= 0) & (there[axis] < size)
+            tried.append(np.ravel_multi_index(tuple(there[:, inside]), grid.shape))
+            guess_from.append(fresh[inside])
+    points, first = np.unique(np.concatenate(tried), return_index=True)
     sources = np.concatenate(guess_from)[first]
-    found = np.zeros(grid.n, dtype=bool)
+    waits = values["status"][points] == NONE_FOUND
+    points, sources = points[waits], sources[waits]
+    found = np.zeros(points.size, dtype=bool)
     for start in range(0, points.size, _CHUNK):
         part = slice(start, start + _CHUNK)
-        rows = gaits_at(
-            grid.section_map, grid.points(points[part]), values["state"][sources[part]], threads
-        )
-        good = rows["status"] == FOUND
-        found[points[part][good]] = True
+        here, guesses = points[part], values["state"][sources[part]]
+        rows = gaits_at(grid.section_map, grid.points(here), guesses, threads)
+        found[part] = good = rows["status"] == FOUND
         for name, column in rows.items():
-            values[name][points[part][good]] = column[good]
-    return found
+            values[name][here[good]] = column[good]
+    return points[found]

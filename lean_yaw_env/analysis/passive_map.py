@@ -24,7 +24,7 @@ from lean_yaw_env.analysis.section_map import (
     require_no_command,
     section_map_of,
 )
-from lean_yaw_env.errors import FellError, NoGaitError
+from lean_yaw_env.errors import FellError, LeanYawError, NoGaitError
 from lean_yaw_env.kernel.passive import INPUTS, PassiveOutcome, passive_jacobian
 from lean_yaw_env.kernel.records import STEPPED, Command
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector, WalkerParameters
@@ -51,6 +51,8 @@ _RATES = np.linspace(0.7, 1.1, 17)
 _SAME_GAIT = 1e-7
 _LEAST_PITCH = 1e-3
 """A smaller step is the solution of not walking at all."""
+_LONGEST_STEP = 2.0 * np.pi
+"""The swing leg's free period: in a longer step it swings to and fro once more, or round."""
 
 _STATUS = PassiveOutcome._fields.index("status")
 _ANGLE = PassiveOutcome._fields.index("inter_leg_angle")
@@ -119,8 +121,9 @@ class PassiveMap(SectionMap):
     def linear_step(self, state: Vector, k: int, parameter: str | None) -> Linearised:
         size = PASSIVE_STATE_SIZE
         rows, after = np.empty((size, INPUTS)), np.empty(size)
-        status = passive_jacobian(self._body, state, SIDE[FEET_IN_TURN[k % 2]], after, rows)
-        raise_for_failure(status, state, self.walker.parameters)
+        side = SIDE[FEET_IN_TURN[k % 2]]
+        status = passive_jacobian(self._body, state, side, after, rows)
+        raise_for_failure(status, self._body, (np.nan,), state, side)
         if status != STEPPED:
             fall = fall_of(status, after[1])
             how = f"fell {fall.value}" if fall else "has no trailing foot on the floor"
@@ -208,29 +211,31 @@ def _planar_parameters(parameters: WalkerParameters) -> WalkerParameters:
 def planar_gaits(parameters: WalkerParameters) -> tuple[Vector, ...]:
     """Section states of the planar walker's symmetric gaits that many starts lead to, that of the longest period first.
 
+    Usually there are two. Those whose swing leg swings to and fro once more within a step are left out.
+
     Raises
     ------
     NoGaitError
         If there is none; says why.
     """
     section_map = PassiveMap(PassiveWalker(parameters, planar=True))
-    states: list[Vector] = []
+    found: list[tuple[float, Vector]] = []
     reasons: set[str] = set()
     for start in _planar_starts(parameters):
         try:
             state = solve_fixed_point(section_map, start)
-        except NoGaitError as error:
+            duration = section_map.over(2).results(state)[0].duration
+        except (LeanYawError, ValueError) as error:
             reasons.add(str(error))
             continue
-        is_new = all(np.abs(state - other).max() > _SAME_GAIT for other in states)
-        if is_new and state[1] > _LEAST_PITCH:
-            states.append(state)
-    if not states:
+        is_new = all(np.abs(state - other).max() > _SAME_GAIT for _, other in found)
+        if is_new and state[1] > _LEAST_PITCH and duration < _LONGEST_STEP:
+            found.append((duration, state))
+    if not found:
         raise NoGaitError(
             "; ".join(sorted(reasons)[:4]) if reasons else "the slope gives no energy"
         )
-    durations = [section_map.results(state)[0].duration for state in states]
-    return tuple(states[k] for k in np.argsort(durations)[::-1])
+    return tuple(state for _, state in sorted(found, key=lambda pair: -pair[0]))
 
 
 def _planar_starts(parameters: WalkerParameters) -> list[Vector]:

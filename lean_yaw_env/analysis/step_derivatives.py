@@ -73,7 +73,7 @@ def differentiate_step(
     start = require_state(state)
     body = walker.parameters.body()
     status, outputs, rows = step_jacobian(body, command, start, SIDE[stance], inputs)
-    raise_for_failure(status, start, walker.parameters)
+    raise_for_failure(status, body, command, start, SIDE[stance])
     if status in FALL_OF_STATUS:
         raise FellError(
             f"the walker fell {FALL_OF_STATUS[status].value} in the step on its {stance} foot"

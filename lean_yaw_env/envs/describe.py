@@ -17,10 +17,10 @@ from lean_yaw_env.envs.info import (
     BODY_INFOS,
     COMMON_INFOS,
     FALL_INFO,
-    FOOTPRINT_MEANING,
+    FOOTPRINT_INFO,
     HEADING_INFO,
     PUSH_INFOS,
-    STATE_MEANING,
+    STATE_INFO,
 )
 from lean_yaw_env.envs.observation import (
     OBSERVATION_LIMIT,
@@ -34,15 +34,9 @@ from lean_yaw_env.envs.tasks import Task, task_named
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, PARAMETER_NAMES, STATE_FIELDS
 from lean_yaw_env.registration import NAMESPACE, TASK_VERSIONS
 
-INFO_MEANINGS = {
-    "state": STATE_MEANING,
-    "footprint": FOOTPRINT_MEANING,
-    **{info.key: info.meaning for info in (*COMMON_INFOS, FALL_INFO)},
-}
+INFOS = (STATE_INFO, FOOTPRINT_INFO, *COMMON_INFOS, FALL_INFO)
 """Of every task."""
-OPTIONAL_INFO_MEANINGS = {
-    info.key: info.meaning for info in (HEADING_INFO, *PUSH_INFOS, *BODY_INFOS)
-}
+OPTIONAL_INFOS = (HEADING_INFO, *PUSH_INFOS, *BODY_INFOS)
 
 
 def table(header: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
@@ -122,8 +116,8 @@ def describe_options() -> str:
 
 def describe_info() -> str:
     """What every task's ``info`` tells."""
-    meanings = {**INFO_MEANINGS, **OPTIONAL_INFO_MEANINGS}
-    return table(("key", "meaning"), ((f"`{key}`", text) for key, text in meanings.items()))
+    told = ((f"`{info.key}`", info.unit, info.meaning) for info in (*INFOS, *OPTIONAL_INFOS))
+    return table(("key", "unit", "meaning"), told)
 
 
 def describe_task(task: Task) -> str:

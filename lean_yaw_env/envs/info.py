@@ -46,69 +46,64 @@ class FallCode(IntEnum):
 
 
 class Info(NamedTuple):
-    """One key of ``info``: the expression in ``walker`` and ``task`` that gives its number, and what it means."""
+    """One key of ``info``: the expression in ``walker`` and ``task`` that gives its number, its unit, and what it means."""
 
     key: str
     source: str
+    unit: str
     meaning: str
 
 
-STATE_MEANING = "section state (5,), not mirrored, after the push if there is one"
-FOOTPRINT_MEANING = "contact reference point of the stance foot (2,): downhill, right, from the start, in leg lengths"
+_FIELDS = {field.name: field for field in WALKER_FIELDS}
+
+
+def _of_walker(name: str, key: str = "", condition: str = "") -> Info:
+    """A field of the walker's record, told under its own name or another one."""
+    field = _FIELDS[name]
+    return Info(key or name, f"walker.{name}", field.unit, field.meaning + condition)
+
+
+STATE_INFO = Info(
+    "state", "", "", "section state (5,), not mirrored, after the push if there is one"
+)
+FOOTPRINT_INFO = Info(
+    "footprint",
+    "",
+    "leg lengths",
+    "contact reference point of the stance foot (2,): downhill, right, from the start",
+)
 _ARRAYS = (*(f"walker.{field.name}" for field in STATE_FIELDS), "walker.place_x", "walker.place_z")
 _FOOTPRINT = slice(STATE_SIZE, STATE_SIZE + 2)
 _FIRST_NUMBER = STATE_SIZE + 2
 _MOST_PAGES = 3  # looked through: who keeps the infos of many steps gets new pages anyway
 
 COMMON_INFOS = (
-    Info("stance_side", "walker.side", "+1 while the left foot stands, -1 the right"),
-    Info(
-        "mass_offset",
-        "walker.mass_offset",
-        "offset in force, leg lengths, positive to the right",
+    _of_walker("side", "stance_side"),
+    *map(
+        _of_walker,
+        (
+            "mass_offset", "inter_leg_angle", "commanded_offset", "time", "steps", "distance",
+            "duration", "least_normal_force", "greatest_friction", "gravity_work", "shift_work",
+            "impact_loss", "ankle_loss", "speed",
+        ),
     ),
-    Info("inter_leg_angle", "walker.inter_leg_angle", "commanded in the last step, rad"),
-    Info("commanded_offset", "walker.commanded_offset", "commanded in the last step"),
-    Info("time", "walker.time", "since the start of the episode"),
-    Info("steps", "walker.steps", "since the start of the episode"),
-    Info(
-        "distance",
-        "walker.distance",
-        "sum of the steps' advances along the mean heading of their two footprints",
-    ),
-    Info("duration", "walker.duration", "of the last step"),
-    Info("least_normal_force", "walker.least_normal_force", "of the last step, in weights"),
-    Info(
-        "greatest_friction",
-        "walker.greatest_friction",
-        "of the last step, tangential over normal force",
-    ),
-    Info("gravity_work", "walker.gravity_work", "of the last step, in weight times leg length"),
-    Info("shift_work", "walker.shift_work", "of the last step, put in by moving the masses"),
-    Info("impact_loss", "walker.impact_loss", "of the last step"),
-    Info("ankle_loss", "walker.ankle_loss", "of the last step, into the ankle's spring and damper"),
-    Info("speed", "walker.speed", "advance over duration of the last completed step"),
-)
+)  # fmt: skip
 FALL_INFO = Info(
     "fall",
     "walker.fall",
+    "",
     "how the last step ended, as an integer: "
     + ", ".join(f"{code.value} {code.word or 'none'}" for code in FallCode),
 )
 PUSH_INFOS = tuple(
-    Info(f"{name}_push", f"walker.{name}_push", f"the last push on the {name} rate; with pushes")
-    for name in ("pitch", "ankle")
+    _of_walker(name, condition="; with pushes") for name in ("pitch_push", "ankle_push")
 )
-BODY_INFOS = tuple(
-    Info(name, f"walker.{name}", "of this episode's body; with random bodies")
-    for name in BODY_NAMES
-)
-HEADING_INFO = Info("commanded_heading", "", "rad; of tasks that command one")
-_WALKER_NAMES = {field.name for field in WALKER_FIELDS}
+BODY_INFOS = tuple(_of_walker(name, condition="; with random bodies") for name in BODY_NAMES)
+HEADING_INFO = Info("commanded_heading", "", "rad", "of tasks that command one")
 
 
 def _read(name: str) -> str:
-    return f"walker.{name}" if name in _WALKER_NAMES else f"task.{name}"
+    return f"walker.{name}" if name in _FIELDS else f"task.{name}"
 
 
 def _metric(key: str, metric: Any) -> Info:
@@ -116,7 +111,7 @@ def _metric(key: str, metric: Any) -> Info:
     if metric.divisor is not None:
         divisor = _read(metric.divisor)
         source = f"{source} / {divisor} if {divisor} > 0 else 0.0"
-    return Info(key, source, metric.meaning)
+    return Info(key, source, "", metric.meaning)
 
 
 def infos_of(task: Any) -> tuple[Info, ...]:

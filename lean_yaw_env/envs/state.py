@@ -50,6 +50,7 @@ class Field(NamedTuple):
     is_followed: bool = False
 
 
+_WORK = "weight times leg length"
 _ODD_STATE = (True, False, True, False, True)
 
 WALKER_FIELDS = (
@@ -64,30 +65,39 @@ WALKER_FIELDS = (
     Field("place_z", "leg lengths", "the same to the right", is_odd=True),
     Field("time", "time units", "since the start of the episode"),
     Field("steps", "", "since the start of the episode", "i8"),
-    Field("distance", "leg lengths", "sum of the advances"),
     Field(
-        "work", "weight times leg length", "sum of the steps' positive work of moving the masses"
+        "distance",
+        "leg lengths",
+        "sum of the steps' advances along the mean heading of their two footprints",
     ),
+    Field("work", _WORK, "sum of the steps' positive work of moving the masses"),
     # --- the last step
-    Field("inter_leg_angle", "rad", "commanded"),
-    Field("commanded_offset", "leg lengths", "commanded mass offset", is_odd=True),
-    Field("effort", "", "mean square of the action's two numbers, each within [-1, 1]"),
-    Field("fall", "", "how it ended, a ``FallCode``; 0 for a completed step", "i8"),
-    Field("duration", "time units", "from heel strike to heel strike"),
-    Field("advance", "leg lengths", "along the mean heading of its two footprints"),
-    Field("speed", "", "advance over duration of the last completed step that took time"),
-    Field("least_normal_force", "weights", "of the floor on the stance foot"),
-    Field("greatest_friction", "", "tangential over normal force"),
-    Field("gravity_work", "weight times leg length", "work of gravity"),
-    Field("shift_work", "weight times leg length", "work of moving the masses"),
-    Field("impact_loss", "weight times leg length", "kinetic energy lost at heel strike"),
-    Field("ankle_loss", "weight times leg length", "into the ankle's spring and damper"),
-    Field("pitch_push", "rad / time unit", "push on the pitch rate after it"),
-    Field("ankle_push", "rad / time unit", "push on the ankle rate after it"),
+    Field("inter_leg_angle", "rad", "commanded in the last step"),
+    Field("commanded_offset", "leg lengths", "commanded in the last step", is_odd=True),
+    Field("effort", "", "mean square of the last action's two numbers, each within [-1, 1]"),
+    Field("fall", "", "how the last step ended, a ``FallCode``; 0 if it was completed", "i8"),
+    Field("duration", "time units", "of the last step"),
+    Field(
+        "advance",
+        "leg lengths",
+        "of the last step, along the mean heading of its two footprints",
+    ),
+    Field("speed", "", "advance over duration of the last completed step"),
+    Field("least_normal_force", "weights", "on the stance foot in the last step"),
+    Field("greatest_friction", "", "tangential over normal force in the last step"),
+    Field("gravity_work", _WORK, "work of gravity in the last step"),
+    Field("shift_work", _WORK, "work of moving the masses in the last step"),
+    Field("impact_loss", _WORK, "kinetic energy lost at the last heel strike"),
+    Field("ankle_loss", _WORK, "into the ankle's spring and damper in the last step"),
+    Field("pitch_push", "rad / time unit", "the last push on the pitch rate"),
+    Field("ankle_push", "rad / time unit", "the last push on the ankle rate", is_odd=True),
     # --- what lasts
-    *(Field(name, "", "of the walker's own body") for name in BODY_NAMES),
-    Field("pending_angle", "rad", "command on its way, where actions are delayed"),
-    Field("pending_offset", "leg lengths", "the same, of the mass offset", is_odd=True),
+    *(
+        Field(name, unit, "of this walker's body")
+        for name, unit in zip(BODY_NAMES, ("leg lengths", "leg lengths", "rad", "rad"), strict=True)
+    ),
+    Field("pending_angle", "rad", "inter-leg angle on its way, where actions are delayed"),
+    Field("pending_offset", "leg lengths", "mass offset on its way", is_odd=True),
     Field("key", "", "of the walker's random numbers", "u8"),
     Field("counter", "", "how many of them are drawn", "u8"),
 )

@@ -199,11 +199,12 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
     def __getstate__(self) -> dict[str, Any]:
         """The arguments, and the state of episodes under way."""
         state = None if self._generators is None else self.get_state()
-        return {**EzPickle.__getstate__(self), "_state": state}
+        return {**EzPickle.__getstate__(self), "_state": state, "_spec": self.spec}
 
     def __setstate__(self, kept: dict[str, Any]) -> None:
-        state = kept.pop("_state")
+        state, spec = kept["_state"], kept["_spec"]
         EzPickle.__setstate__(self, kept)
+        self.spec = spec
         if state is not None:
             self.set_state(state)
 

@@ -170,11 +170,12 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
     def __getstate__(self) -> dict[str, Any]:
         """The arguments, and the state of an episode under way."""
         state = self.get_state() if self._running else None
-        return {**EzPickle.__getstate__(self), "_state": state}
+        return {**EzPickle.__getstate__(self), "_state": state, "_spec": self.spec}
 
     def __setstate__(self, kept: dict[str, Any]) -> None:
-        state = kept.pop("_state")
+        state, spec = kept["_state"], kept["_spec"]
         EzPickle.__setstate__(self, kept)
+        self.spec = spec
         if state is not None:
             self.set_state(state)
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from lean_yaw_env.kernel.compilation import inlined
 from lean_yaw_env.kernel.lanes import LANES, ROW, lane_reader, lane_writer, padded
-from lean_yaw_env.kernel.records import FLYING, WITHOUT_DERIVATIVE, Body
+from lean_yaw_env.kernel.records import FAILED, FLYING, WITHOUT_DERIVATIVE, Body
 
 # An imaginary part so small that its square vanishes: what it becomes is as many times a derivative, to round-off
 TINY = 1e-30
@@ -36,6 +36,7 @@ class Model:
     begin : ``begin(body, command, state, side)`` returns the stance and the flight at the start
     advance : ``advance(stance, flight)`` returns the flight an integrator step later
     finish : ``finish(stance, flight)`` returns the outcome of a flight that has ended
+    carefully : ``carefully(body, command, state, side)`` returns the outcome of a step that has come out as ``FAILED``, found another way
     """
 
     command: type[Any]
@@ -48,10 +49,80 @@ class Model:
     begin: Callable[..., Any]
     advance: Callable[..., Any]
     finish: Callable[..., Any]
+    carefully: Callable[..., Any]
 
 
 class _Block(NamedTuple):
-    """Where a block's rows are, and what is done to its lanes."""
+    """Where a block's rows are, and the formula that walks its lanes."""
+
+    who: int
+    outcome: int
+    derivatives: int
+    size: int
+    walk: Any
+
+
+def _block(model: Model, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> _Block:
+    """A block whose lanes carry derivatives by ``inputs`` of ``outputs``, if there are any."""
+
+    def rows(record: type[Any]) -> int:
+        return len(record._fields) * ROW
+
+    def carried(record: type[Any]) -> list[str]:
+        return [name for name in record._fields if inputs and name not in WITHOUT_DERIVATIVE]
+
+    def among(record: type[Any]) -> list[str]:
+        return [name for name in inputs if name in record._fields]
+
+    stance = 0
+    stance_derivatives = stance + rows(model.stance)
+    flight = stance_derivatives + len(carried(model.stance)) * ROW
+    flight_derivatives = flight + rows(model.flight)
+    who = flight_derivatives + len(carried(model.flight)) * ROW
+    # What a step starts from is in rows only until the flight begins, in the place of its outcome
+    state = outcome = who + ROW
+    command = state + rows(model.state)
+    body = command + rows(model.command)
+    side = body + rows(Body)
+    seeds = side + ROW
+    command_seeds = seeds + len(among(model.state)) * ROW
+    body_seeds = command_seeds + len(among(model.command)) * ROW
+    derivatives = outcome + rows(model.outcome)
+
+    formulas = _Formulas(
+        lane_reader(model.state, state, among(model.state), seeds),
+        lane_reader(model.command, command, among(model.command), command_seeds),
+        lane_reader(Body, body, among(Body), body_seeds),
+        lane_reader(model.stance, stance, carried(model.stance), stance_derivatives),
+        lane_writer(model.stance, stance, carried(model.stance), stance_derivatives),
+        lane_reader(model.flight, flight, carried(model.flight), flight_derivatives),
+        lane_writer(model.flight, flight, carried(model.flight), flight_derivatives),
+        lane_writer(model.outcome, outcome, outputs, derivatives),
+    )
+    places = _Places(
+        state, command, body, side, seeds, who,
+        flight + model.flight._fields.index("status") * ROW,
+        outcome + model.outcome._fields.index("status") * ROW,
+    )  # fmt: skip
+    size = max(seeds + len(inputs) * ROW, derivatives + len(outputs) * ROW)
+    return _Block(who, outcome, derivatives, size, _walk(model, places, formulas, len(inputs)))
+
+
+class _Formulas(NamedTuple):
+    """What reads and writes a block's records."""
+
+    read_state: Any
+    read_command: Any
+    read_body: Any
+    read_stance: Any
+    write_stance: Any
+    read_flight: Any
+    write_flight: Any
+    write_outcome: Any
+
+
+class _Places(NamedTuple):
+    """The first places of a block's rows."""
 
     state: int
     command: int
@@ -59,61 +130,39 @@ class _Block(NamedTuple):
     side: int
     seeds: int
     who: int
-    outcome: int
-    derivatives: int
-    size: int
-    begin: Any
-    fly: Any
-    finish: Any
+    status: int
+    ended: int  # the outcome's status
 
 
-def _block(model: Model, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> _Block:
-    """A block whose lanes carry derivatives by ``inputs`` of ``outputs``, if there are any."""
-    records = (model.stance, model.flight)
-    carried = [
-        [name for name in record._fields if inputs and name not in WITHOUT_DERIVATIVE]
-        for record in records
-    ]
-    stance = 0
-    stance_derivatives = stance + len(model.stance._fields) * ROW
-    flight = stance_derivatives + len(carried[0]) * ROW
-    flight_derivatives = flight + len(model.flight._fields) * ROW
-    who = flight_derivatives + len(carried[1]) * ROW
+def _walk(model: Model, places: _Places, formulas: _Formulas, inputs: int) -> Any:
+    """``walk(work, first, n, columns, bodies, commands, states, sides)``: follow ``n`` lanes to their outcomes.
+
+    Lane ``first`` + i is that of walker (``first`` + i) // ``columns``, differentiated by the input of number (``first`` + i) % ``columns``.
+    """
+    state, command, body, side, seeds, who, status, ended = places
+    read_state, read_command, read_body, read_stance = formulas[:4]
+    write_stance, read_flight, write_flight, write_outcome = formulas[4:]
+    begin, advance, finish, carefully = model.begin, model.advance, model.finish, model.carefully
+    states_size, commands_size, bodies_size = (
+        len(record._fields) for record in (model.state, model.command, Body)
+    )
     swapped = who // ROW + 1  # rows that a lane in flight needs
-    status = flight + model.flight._fields.index("status") * ROW
-    # What a step starts from is in rows only until the flight begins, in the place of its outcome
-    state = outcome = who + ROW
-    command = state + len(model.state._fields) * ROW
-    body = command + len(model.command._fields) * ROW
-    side = body + len(Body._fields) * ROW
-    seeds = side + ROW
-    derivatives = outcome + len(model.outcome._fields) * ROW
-    size = max(seeds + len(inputs) * ROW, derivatives + len(outputs) * ROW)
-
-    def of(record: type[Any]) -> list[str]:
-        return [name for name in inputs if name in record._fields]
-
-    command_seeds = seeds + len(of(model.state)) * ROW
-    body_seeds = command_seeds + len(of(model.command)) * ROW
-    read_state = lane_reader(model.state, state, of(model.state), seeds)
-    read_command = lane_reader(model.command, command, of(model.command), command_seeds)
-    read_body = lane_reader(Body, body, of(Body), body_seeds)
-    read_stance = lane_reader(model.stance, stance, carried[0], stance_derivatives)
-    write_stance = lane_writer(model.stance, stance, carried[0], stance_derivatives)
-    read_flight = lane_reader(model.flight, flight, carried[1], flight_derivatives)
-    write_flight = lane_writer(model.flight, flight, carried[1], flight_derivatives)
-    write_outcome = lane_writer(model.outcome, outcome, outputs, derivatives)
-    begin_step, advance_step, finish_step = model.begin, model.advance, model.finish
 
     @inlined
-    def begin(work, n):
-        """Start the flights of the first ``n`` lanes."""
-        for i in range(padded(n)):
-            started, flying = begin_step(
-                read_body(work, i), read_command(work, i), read_state(work, i), work[side + i]
-            )
-            write_stance(work, i, started)
-            write_flight(work, i, flying)
+    def enter(work, i, lane, columns, bodies, commands, states, sides):
+        """Put what a step starts from into lane ``i``."""
+        walker, column = lane // columns, lane % columns
+        for k in range(states_size):
+            work[state + k * ROW + i] = states[walker, k]
+        for k in range(commands_size):
+            work[command + k * ROW + i] = commands[walker, k]
+        row = walker if bodies.shape[0] > 1 else 0
+        for k in range(bodies_size):
+            work[body + k * ROW + i] = bodies[row, k]
+        work[side + i] = sides[walker]
+        for k in range(inputs):
+            work[seeds + k * ROW + i] = TINY if k == column else 0.0
+        work[who + i] = lane
 
     @inlined
     def gather_flying(work, n):
@@ -132,26 +181,34 @@ def _block(model: Model, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> _
         return i
 
     @inlined
-    def fly(work, n):
-        """Follow the flights of the first ``n`` lanes to their ends."""
+    def walk(work, first, n, columns, bodies, commands, states, sides):
+        for i in range(n):
+            enter(work, i, first + i, columns, bodies, commands, states, sides)
+        for i in range(padded(n)):
+            stance, flight = begin(
+                read_body(work, i), read_command(work, i), read_state(work, i), work[side + i]
+            )
+            write_stance(work, i, stance)
+            write_flight(work, i, flight)
         flying = gather_flying(work, n)
         while flying > 0:
             for i in range(padded(flying)):
-                before = read_flight(work, i)
-                onward = advance_step(read_stance(work, i), before)
-                if before.status == FLYING:
+                flight = read_flight(work, i)
+                onward = advance(read_stance(work, i), flight)
+                if flight.status == FLYING:
                     write_flight(work, i, onward)
             flying = gather_flying(work, flying)
-
-    @inlined
-    def finish(work, n):
-        """Put the outcomes of the first ``n`` lanes into their rows."""
         for i in range(padded(n)):
-            write_outcome(work, i, finish_step(read_stance(work, i), read_flight(work, i)))
+            write_outcome(work, i, finish(read_stance(work, i), read_flight(work, i)))
+        for i in range(n):
+            if work[ended + i] == FAILED:
+                enter(work, i, int(work[who + i]), columns, bodies, commands, states, sides)
+                found = carefully(
+                    read_body(work, i), read_command(work, i), read_state(work, i), work[side + i]
+                )
+                write_outcome(work, i, found)
 
-    return _Block(
-        state, command, body, side, seeds, who, outcome, derivatives, size, begin, fly, finish
-    )
+    return walk
 
 
 def steps_of(model: Model) -> Any:
@@ -159,29 +216,19 @@ def steps_of(model: Model) -> Any:
 
     Rows of ``bodies`` (1 or n, 11), ``commands``, ``states`` and ``outcomes`` (n, .) are the model's records; ``sides`` (n,).
     """
-    block = _block(model, (), ())
-    copy_in, begin, fly, finish = _copied_in(model, block), block.begin, block.fly, block.finish
-    who_row, outcome_rows, outcome_size, size = (
-        block.who,
-        block.outcome,
-        len(model.outcome._fields),
-        block.size,
-    )
+    who, outcome, _, size, walk = _block(model, (), ())
+    fields = len(model.outcome._fields)
 
     @inlined
     def run(bodies, commands, states, sides, outcomes, first, last):
         work = np.zeros(size)
         for begun in range(first, last, LANES):
             n = min(LANES, last - begun)
+            walk(work, begun, n, 1, bodies, commands, states, sides)
             for i in range(n):
-                copy_in(work, i, begun + i, bodies, commands, states, sides)
-            begin(work, n)
-            fly(work, n)
-            finish(work, n)
-            for i in range(n):
-                who = int(work[who_row + i])
-                for k in range(outcome_size):
-                    outcomes[who, k] = work[outcome_rows + k * ROW + i]
+                walker = int(work[who + i])
+                for k in range(fields):
+                    outcomes[walker, k] = work[outcome + k * ROW + i]
 
     return run
 
@@ -193,13 +240,10 @@ def derivatives_of(model: Model) -> Any:
     the first of the model's outputs in ``outputs`` (n, .), and the derivatives of the first k of them by the first m inputs in
     ``jacobians`` (n, k, m).
     """
-    block = _block(model, model.inputs, model.outputs)
-    copy_in, begin, fly, finish = _copied_in(model, block), block.begin, block.fly, block.finish
-    who_row, seeds, derivative_rows, size = block.who, block.seeds, block.derivatives, block.size
-    inputs = len(model.inputs)
+    who, outcome, derivatives, size, walk = _block(model, model.inputs, model.outputs)
     fields = model.outcome._fields
-    status_row = block.outcome + fields.index("status") * ROW
-    output_rows = tuple(block.outcome + fields.index(name) * ROW for name in model.outputs)
+    status = outcome + fields.index("status") * ROW
+    values = tuple(outcome + fields.index(name) * ROW for name in model.outputs)
 
     @inlined
     def run(bodies, commands, states, sides, statuses, outputs, jacobians, first, last):
@@ -208,44 +252,15 @@ def derivatives_of(model: Model) -> Any:
         together = LANES // columns
         for begun in range(first, last, together):
             n = min(together, last - begun) * columns
+            walk(work, begun * columns, n, columns, bodies, commands, states, sides)
             for i in range(n):
-                copy_in(work, i, begun + i // columns, bodies, commands, states, sides)
-                work[who_row + i] = begun * columns + i
-                for k in range(inputs):
-                    work[seeds + k * ROW + i] = TINY if k == i % columns else 0.0
-            begin(work, n)
-            fly(work, n)
-            finish(work, n)
-            for i in range(n):
-                lane = int(work[who_row + i])
-                who, column = lane // columns, lane % columns
+                lane = int(work[who + i])
+                walker, column = lane // columns, lane % columns
                 for k in range(jacobians.shape[1]):
-                    jacobians[who, k, column] = work[derivative_rows + k * ROW + i] / TINY
+                    jacobians[walker, k, column] = work[derivatives + k * ROW + i] / TINY
                 if column == 0:
-                    statuses[who] = work[status_row + i]
+                    statuses[walker] = work[status + i]
                     for k in range(outputs.shape[1]):
-                        outputs[who, k] = work[output_rows[k] + i]
+                        outputs[walker, k] = work[values[k] + i]
 
     return run
-
-
-def _copied_in(model: Model, block: _Block) -> Any:
-    """``copy_in(work, i, who, bodies, commands, states, sides)``: what walker ``who`` starts from, into lane ``i``."""
-    body_rows, body_size = block.body, len(Body._fields)
-    command_rows, command_size = block.command, len(model.command._fields)
-    state_rows, state_size = block.state, len(model.state._fields)
-    side_row, who_row = block.side, block.who
-
-    @inlined
-    def copy_in(work, i, who, bodies, commands, states, sides):
-        body = who if bodies.shape[0] > 1 else 0
-        for k in range(body_size):
-            work[body_rows + k * ROW + i] = bodies[body, k]
-        for k in range(command_size):
-            work[command_rows + k * ROW + i] = commands[who, k]
-        for k in range(state_size):
-            work[state_rows + k * ROW + i] = states[who, k]
-        work[side_row + i] = sides[who]
-        work[who_row + i] = who
-
-    return copy_in

@@ -36,6 +36,10 @@ _overload: Any = overload
 inlined = _njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
 
 
+apart = _njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
+"""Mark a formula that is called and not inlined: for what is needed too rarely to be worth a copy in each kernel."""
+
+
 def fused(function: Any) -> Any:
     """Mark a formula of floats as ``inlined`` does, with products and sums fused; see ``fusing``."""
     return function if _config.DISABLE_JIT else inlined(fusing.fuse(function))

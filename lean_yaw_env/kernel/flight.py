@@ -7,6 +7,8 @@ landing by more than ``LANDING_WINDOW`` is taken again with the length that the 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from lean_yaw_env.kernel import verner
@@ -50,7 +52,7 @@ LANDING_WINDOW = 0.01
 SHIFTING_LANDING_WINDOW = 0.002  # the moving masses' path has larger derivatives
 # The same, in steps that the error control allows: a walker that collapses moves on a shorter time scale.
 LANDING_WINDOW_SHARE = 0.04
-# A walking step takes two to ten attempts, one with a stiff ankle some hundreds; a solver that needs this many is stuck.
+# A walking step takes two to ten attempts, one with a stiff ankle some hundreds; ``careful`` takes over from a solver that needs this many.
 MOST_ATTEMPTS = 4000.0
 # A walker that all but stops short of mid-stance may creep back, lean, and yet come down in front. Of 3,000 walkers disturbed around
 # Table 1's gait that moved back at this rate and sped up, none did; of those that moved back at all, up to a third.
@@ -168,6 +170,12 @@ def shift_end_of(stance):
 
 
 @fused
+def is_shifting(stance, time):
+    """Whether the masses move on at this time."""
+    return time.real < shift_end_of(stance) - _SAME_TIME
+
+
+@fused
 def is_rolling_back(pitch_rate, pitch_acceleration):
     """Whether the stance leg has turned back; asked of walkers whose masses are at rest, as a shift pushes the leg about."""
     return (pitch_rate.real >= BACKWARD_RATE) & (pitch_acceleration.real >= 0.0)
@@ -202,16 +210,36 @@ def stance_step(c, t, x, b, w, v, dw, dv, h):
     return x, b, w, v, error, loss, normals, squares
 
 
+class Trial(NamedTuple):
+    """Where an integrator step would end, and what it has seen on the way."""
+
+    time: float
+    pitch: float
+    twist: float
+    pitch_rate: float
+    twist_rate: float
+    pitch_acceleration: float
+    twist_acceleration: float
+    gap: float
+    gap_rate: float
+    gap_acceleration: float
+    error: float  # in tolerances
+    damping_loss: float
+    normal_force: float
+    tangential_squared: float
+    least_normal_force: float
+    friction_squared: float
+    collapses: bool
+
+
 @fused
-def advance(stance, flight):
-    """Try one integrator step; accept, shorten or repeat it, and say whether the walker lands or falls."""
-    h = flight.next_step
+def trial(stance, flight, h):
+    """An integrator step of length ``h``."""
     pitch, twist, pitch_rate, twist_rate, error, loss, normals, squares = stance_step(
         stance, flight.time, flight.pitch, flight.twist, flight.pitch_rate, flight.twist_rate,
         flight.pitch_acceleration, flight.twist_acceleration, h,
     )  # fmt: skip
     time = flight.time + h
-    now = time.real
     pitch_acceleration, twist_acceleration, normal, square = accelerations_and_forces(
         stance, time, pitch, twist, pitch_rate, twist_rate
     )
@@ -221,67 +249,62 @@ def advance(stance, flight):
         stance, sin_a, cos_a, sin_twist, cos_twist,
         pitch_rate, twist_rate, pitch_acceleration, twist_acceleration,
     )  # fmt: skip
-    landing, passed = predict_landing(
-        h, flight.gap.real, flight.gap_rate.real, flight.gap_acceleration.real,
-        gap.real, gap_rate.real, gap_acceleration.real,
-    )  # fmt: skip
-
-    collapses = is_collapsing(stance, time, sin_a, cos_a, sin_twist, cos_twist, upright)
-    shift_end = shift_end_of(stance)
-    begins_shifting = flight.time.real < shift_end - _SAME_TIME
-    shifting = now < shift_end - _SAME_TIME
+    begins_shifting = is_shifting(stance, flight.time)
     caution = shift_caution(stance.offset_change.real) if begins_shifting else 1.0
-    ratio = error * caution * _PER_TOLERANCE
-    accurate = ratio <= 1.0  # a NaN is not
-    factor = 0.9 / eighth_root(max(ratio, 1e-8))
-    longer = h * min(max(factor, 0.5), 4.0)
-    window = SHIFTING_LANDING_WINDOW if shifting else LANDING_WINDOW
-    window = min(window, LANDING_WINDOW_SHARE * longer)
-    repeat = passed & (landing < -window)
-    accepted = accurate & (not repeat)
-    landed = accepted & (abs(landing) <= window) & ((not shifting) | (now + landing <= shift_end))
-
-    shorter = h * min(max(factor, 0.2), 0.9) if ratio > 1.0 else 0.2 * h
-    shorter = h + landing if accurate else shorter
-    ahead = landing if landing > 0.0 else _UNKNOWN
-    onward = next_step_length(longer, ahead, now, shift_end)
-    onward = landing if landed else onward
-    next_step = onward if accepted else shorter
-
     least, most = worst_contact(
         (flight.normal_force, normals[0], normals[1], normals[2], normal.real),
         (flight.tangential_squared, squares[0], squares[1], squares[2], square.real),
     )
-    least = min(flight.least_normal_force, least)
-    most = max(flight.friction_squared, most)
+    return Trial(
+        time, pitch, twist, pitch_rate, twist_rate, pitch_acceleration, twist_acceleration,
+        gap, gap_rate, gap_acceleration, error * caution * _PER_TOLERANCE, loss,
+        normal.real, square.real, min(flight.least_normal_force, least), max(flight.friction_squared, most),
+        is_collapsing(stance, time, sin_a, cos_a, sin_twist, cos_twist, upright),
+    )  # fmt: skip
+
+
+@fused
+def controlled_lengths(h, error):
+    """How long a step the error control allows after one of this error (in tolerances), and for trying that one again."""
+    factor = 0.9 / eighth_root(max(error, 1e-8))
+    longer = h * min(max(factor, 0.5), 4.0)
+    shorter = h * min(max(factor, 0.2), 0.9) if error > 1.0 else 0.2 * h
+    return longer, shorter
+
+
+@fused
+def taken(stance, flight, tried, accepted, landed, next_step, most_attempts):
+    """The flight after an integrator step was tried: whether the walker lands or falls there, if it was accepted."""
     attempts = flight.attempts + 1.0
-    rolls_back = is_rolling_back(pitch_rate, pitch_acceleration) & (not shifting)
-    status = FAILED if attempts >= MOST_ATTEMPTS else FLYING
+    rolls_back = is_rolling_back(tried.pitch_rate, tried.pitch_acceleration) & (
+        not is_shifting(stance, tried.time)
+    )
+    status = FAILED if attempts >= most_attempts else FLYING
     if accepted:
-        status = NO_STRIKE if now >= stance.max_duration.real else status
+        status = NO_STRIKE if tried.time.real >= stance.max_duration.real else status
         status = BACKWARD if rolls_back else status
         status = LANDING if landed else status
-        status = SIDEWAYS if collapses else status
-        status = SLIP if most > stance.friction_limit_squared.real else status
-        status = LIFT_OFF if least <= 0.0 else status
+        status = SIDEWAYS if tried.collapses else status
+        status = SLIP if tried.friction_squared > stance.friction_limit_squared.real else status
+        status = LIFT_OFF if tried.least_normal_force <= 0.0 else status
 
     return Flight(
-        time if accepted else flight.time,
-        pitch if accepted else flight.pitch,
-        twist if accepted else flight.twist,
-        pitch_rate if accepted else flight.pitch_rate,
-        twist_rate if accepted else flight.twist_rate,
-        pitch_acceleration if accepted else flight.pitch_acceleration,
-        twist_acceleration if accepted else flight.twist_acceleration,
-        gap if accepted else flight.gap,
-        gap_rate if accepted else flight.gap_rate,
-        gap_acceleration if accepted else flight.gap_acceleration,
+        tried.time if accepted else flight.time,
+        tried.pitch if accepted else flight.pitch,
+        tried.twist if accepted else flight.twist,
+        tried.pitch_rate if accepted else flight.pitch_rate,
+        tried.twist_rate if accepted else flight.twist_rate,
+        tried.pitch_acceleration if accepted else flight.pitch_acceleration,
+        tried.twist_acceleration if accepted else flight.twist_acceleration,
+        tried.gap if accepted else flight.gap,
+        tried.gap_rate if accepted else flight.gap_rate,
+        tried.gap_acceleration if accepted else flight.gap_acceleration,
         next_step,
-        normal.real if accepted else flight.normal_force,
-        square.real if accepted else flight.tangential_squared,
-        least if accepted else flight.least_normal_force,
-        most if accepted else flight.friction_squared,
-        flight.damping_loss + loss if accepted else flight.damping_loss,
+        tried.normal_force if accepted else flight.normal_force,
+        tried.tangential_squared if accepted else flight.tangential_squared,
+        tried.least_normal_force if accepted else flight.least_normal_force,
+        tried.friction_squared if accepted else flight.friction_squared,
+        flight.damping_loss + tried.damping_loss if accepted else flight.damping_loss,
         flight.evaluations + 13.0,
         attempts,
         status,
@@ -289,3 +312,31 @@ def advance(stance, flight):
         flight.start_twist,
         flight.start_kinetic,
     )
+
+
+@fused
+def advance(stance, flight):
+    """Try one integrator step; accept, shorten or repeat it, and say whether the walker lands or falls."""
+    h = flight.next_step
+    tried = trial(stance, flight, h)
+    now = tried.time.real
+    landing, passed = predict_landing(
+        h, flight.gap.real, flight.gap_rate.real, flight.gap_acceleration.real,
+        tried.gap.real, tried.gap_rate.real, tried.gap_acceleration.real,
+    )  # fmt: skip
+    shift_end = shift_end_of(stance)
+    shifting = is_shifting(stance, tried.time)
+    accurate = tried.error <= 1.0  # a NaN is not
+    longer, shorter = controlled_lengths(h, tried.error)
+    window = SHIFTING_LANDING_WINDOW if shifting else LANDING_WINDOW
+    window = min(window, LANDING_WINDOW_SHARE * longer)
+    repeat = passed & (landing < -window)
+    accepted = accurate & (not repeat)
+    landed = accepted & (abs(landing) <= window) & ((not shifting) | (now + landing <= shift_end))
+
+    shorter = h + landing if accurate else shorter
+    ahead = landing if landing > 0.0 else _UNKNOWN
+    onward = next_step_length(longer, ahead, now, shift_end)
+    onward = landing if landed else onward
+    next_step = onward if accepted else shorter
+    return taken(stance, flight, tried, accepted, landed, next_step, MOST_ATTEMPTS)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-# How an attempt at a step stands; the first two are not ends.
-FLYING, LANDING = 0.0, 1.0
+# How an attempt at a step stands. These are not ends: in the air, near the floor, and on it.
+FLYING, LANDING, LANDED = 0.0, 1.0, 10.0
 STEPPED, BACKWARD, SIDEWAYS, TRIP, LIFT_OFF, SLIP, NO_STRIKE, FAILED = (
     2.0,
     3.0,

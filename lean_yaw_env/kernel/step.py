@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from lean_yaw_env.kernel.blocks import Model
-from lean_yaw_env.kernel.compilation import entry_point, fused, inlined
+from lean_yaw_env.kernel.careful import fly_carefully
+from lean_yaw_env.kernel.compilation import apart, entry_point, fused, inlined
 from lean_yaw_env.kernel.elementary import quotient, sine_cosine, within_half_turn
 from lean_yaw_env.kernel.flight import (
     advance,
@@ -25,6 +26,7 @@ from lean_yaw_env.kernel.records import (
     BODY_INPUTS,
     FAILED,
     FLYING,
+    LANDED,
     LANDING,
     LIFT_OFF,
     SIDEWAYS,
@@ -114,7 +116,7 @@ def begin(body, command, state, side):
     rolls_back = is_rolling_back(pitch_rate, dw) & (shift_end_of(stance).real <= 0.0)
     status = BACKWARD if rolls_back else FLYING
     status = TRIP if buried else status
-    status = LANDING if strikes else status
+    status = LANDED if strikes else status
     collapses = is_collapsing(stance, time, sin_a, cos_a, sin_twist, cos_twist, upright)
     status = SIDEWAYS if collapses else status
     status = SLIP if friction.real > stance.friction_limit_squared.real else status
@@ -196,11 +198,9 @@ def touch_down(stance, flight):
 @fused
 def finish(stance, flight):
     """The outcome of a flight that has ended: the heel strike of one that lands, the last state of one that fell."""
-    landing = flight.status == LANDING
-    # An immediate strike has no gap to close: the foot is in the floor already
-    immediate = landing & (flight.next_step == 0.0) & (flight.attempts == 0.0)
+    moves = flight.status == LANDING
+    landing = moves | (flight.status == LANDED)
     moved_time, moved_x, moved_b, moved_w, moved_v, gap, moved_loss = touch_down(stance, flight)
-    moves = landing & (not immediate)
     time = moved_time if moves else flight.time
     x = moved_x if moves else flight.pitch
     b = moved_b if moves else flight.twist
@@ -232,7 +232,7 @@ def finish(stance, flight):
         new_sin_a, new_cos_a, new_sin_twist, new_cos_twist,
     )  # fmt: skip
 
-    found = immediate | (abs(gap.real) <= LANDING_RESIDUAL)
+    found = (not moves) | (abs(gap.real) <= LANDING_RESIDUAL)
     # A walker that collapses onto its swing foot closes the gap as well: a step goes forward, onto a foot in front
     forward = (w.real < 0.0) & (ahead.real > 0.0) & (cos_turn.real > 0.0)
     status = flight.status
@@ -279,6 +279,13 @@ def finish(stance, flight):
     )
 
 
+@apart
+def walk_carefully(body, command, state, side):
+    """A walking step whose landing ``advance`` has not found."""
+    stance, flight = begin(body, command, state, side)
+    return finish(stance, fly_carefully(stance, flight))
+
+
 @inlined
 def walking_step(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side):
     """One walking step; numbers may be complex to carry a derivative, every decision looks at real parts."""
@@ -286,7 +293,10 @@ def walking_step(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, s
     stance, flight = begin(body, command, state, side)
     while flight.status == FLYING:
         flight = advance(stance, flight)
-    return finish(stance, flight)
+    outcome = finish(stance, flight)
+    if outcome.status == FAILED:
+        outcome = walk_carefully(body, command, state, side)
+    return outcome
 
 
 ACTIVE = Model(
@@ -307,6 +317,7 @@ ACTIVE = Model(
     begin=begin,
     advance=advance,
     finish=finish,
+    carefully=walk_carefully,
 )
 """The walker whose swing leg is held in front."""
 

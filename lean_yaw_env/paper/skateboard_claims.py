@@ -20,7 +20,7 @@ _FAST = np.linspace(0.0, 10.0, 20)
 def truck_turn(lean: float, steering_tilt: float) -> float:
     """Angle by which an axle turns about its steering axis to stay level under a leaning board, rad.
 
-    The axle (0, 1, 0), turned by b about the axis (sin α, 0, cos α) of the board and leant by θ about the x-axis, has the height
+    The axle (0, 1, 0), turned by b about the axis (-sin α, 0, -cos α) of the board and leant by θ about the x-axis, has the height
     cos(b) sin(θ) - sin(α) sin(b) cos(θ), which is zero where tan(b) = tan(θ) / sin(α).
     """
     return math.atan(math.tan(lean) / math.sin(steering_tilt))

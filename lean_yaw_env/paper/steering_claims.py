@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lean_yaw_env.analysis import largest_disturbance, section_map_of
+from lean_yaw_env.analysis import largest_disturbance
 from lean_yaw_env.paper.checks import Check, judge
 from lean_yaw_env.paper.numbers import LARGE_OFFSET, statement
 from lean_yaw_env.paper.results import Result
@@ -53,8 +53,7 @@ def _circle_check() -> Check:
 
 
 def _limp_check() -> Check:
-    stride = section_map_of(circling_walker(), mass_offset=LARGE_OFFSET)
-    left, right = (step.duration for step in stride.results(circling_gait().state))
+    left, right = (step.duration for step in circling_gait().steps)
     holds = abs(left / right - 1.0) > 0.01
     return judge(
         statement("limp"),

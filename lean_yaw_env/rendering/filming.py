@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -31,7 +32,7 @@ _SAMPLES = 33  # per step; straight lines between them are wrong by less than 1e
 _COORDINATES = ("stance_pitch", "ankle_angle", "mass_offset")
 
 Frame = NDArray[np.uint8]
-Writer = Callable[[Path, Iterable[Frame], float, tuple[int, int]], None]
+Encoder = Callable[[Path, Iterable[Frame], float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +75,7 @@ def film(
     walker : Walker
     n_steps, state, stance, inter_leg_angle, mass_offset, previous_offset : see ``Walker.walk``
     path : str or path
-        An .mp4 or a .gif; written whole or not at all. A gif's frames last whole hundredths of a
-        second, to which its rate is rounded.
+        An .mp4 or a .gif; written whole or not at all.
     commanded_heading : float, or one per step, optional
         rad; drawn as an arrow.
     fps : [1, 120]
@@ -101,14 +101,10 @@ def film(
     gymnasium.error.DependencyNotInstalled
         If what writes such a file is not installed.
     """
-    place = require_ending(path, (".mp4", ".gif"))
     require_number("fps", fps, 1, 120)
+    file = FilmFile(path, fps)
     require_number("seconds_per_time_unit", seconds_per_time_unit, 0.0, 100.0, "(]")
     require_number("swing_share", swing_share, 0.0, 1.0)
-    is_gif = place.suffix.lower() == ".gif"
-    write, rate = (gif_writer(), gif_rate(fps)) if is_gif else (mp4_writer(), float(fps))
-    with needs_extra("render"):
-        from tqdm import tqdm
     renderer = Renderer(size)
     walk = walker.walk(
         n_steps,
@@ -119,14 +115,9 @@ def film(
         previous_offset=previous_offset,
     )
     recording = _record(walker, walk, n_steps, inter_leg_angle, mass_offset, commanded_heading)
-    times = np.arange(0.0, recording.ends[-1], 1.0 / (rate * seconds_per_time_unit))
-    hold = round(HOLD_SECONDS * rate) if walk.fall else 0
-    scenes = (_scene(walker, recording, time, swing_share) for time in times)
-    frames = _with_last_repeated((renderer.frame(scene) for scene in scenes), hold)
-    if progress:
-        frames = tqdm(frames, total=len(times) + hold, desc=place.name, unit="frame")
-    with written_whole(place) as temporary:
-        write(temporary, frames, rate, renderer.size)
+    times = np.arange(0.0, recording.ends[-1], 1.0 / (file.rate * seconds_per_time_unit))
+    frames = (renderer.frame(_scene(walker, recording, time, swing_share)) for time in times)
+    file.write(frames, len(times), holds_last=walk.fall is not None, progress=progress)
     return walk
 
 
@@ -233,6 +224,46 @@ def swing_angle(angles: Vector, i: int, share: float, swing_share: float) -> flo
     return float(-angles[i - 1] + blend * (angles[i] + angles[i - 1]))
 
 
+class FilmFile:
+    """An .mp4 or a .gif, written whole or not at all.
+
+    Parameters
+    ----------
+    path : str or path
+    fps : float
+        Frames per second. A gif's frames last whole hundredths of a second, two or more, to which ``rate`` is rounded: viewers slow
+        faster films down.
+
+    Raises
+    ------
+    ValueError
+        If the path has another ending.
+    gymnasium.error.DependencyNotInstalled
+        If what writes such a file is not installed.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], fps: float) -> None:
+        self._path = require_ending(path, (".mp4", ".gif"))
+        is_gif = self._path.suffix.lower() == ".gif"
+        self.rate = 100.0 / max(round(100.0 / fps), 2) if is_gif else float(fps)
+        self._encode = _gif_encoder() if is_gif else _mp4_encoder()
+        with needs_extra("render"):
+            from tqdm import tqdm
+        self._progress_bar = tqdm
+
+    def write(
+        self, frames: Iterable[Frame], count: int, *, holds_last: bool, progress: bool
+    ) -> None:
+        """Write ``count`` frames, the last for a second more if a walker has fallen in it."""
+        hold = round(HOLD_SECONDS * self.rate) if holds_last else 0
+        frames = _with_last_repeated(frames, hold)
+        if progress:
+            total, name = count + hold, self._path.name
+            frames = self._progress_bar(frames, total=total, desc=name, unit="frame")
+        with written_whole(self._path) as temporary:
+            self._encode(temporary, frames, self.rate)
+
+
 def _with_last_repeated(frames: Iterable[Frame], count: int) -> Iterator[Frame]:
     last: list[Frame] = []
     for frame in frames:
@@ -242,27 +273,19 @@ def _with_last_repeated(frames: Iterable[Frame], count: int) -> Iterator[Frame]:
         yield from last
 
 
-def gif_rate(fps: float) -> float:
-    """The nearest rate whose frames last whole hundredths of a second.
-
-    At least two of them: viewers slow faster films down.
-    """
-    return 100.0 / max(round(100.0 / fps), 2)
-
-
-def mp4_writer() -> Writer:
-    """What writes frames as an .mp4; raises ``DependencyNotInstalled`` where ffmpeg is missing."""
+def _mp4_encoder() -> Encoder:
     with needs_extra("render"):
         import imageio_ffmpeg
-    write_frames: Any = (
-        imageio_ffmpeg.write_frames
-    )  # whose type hints know only its defaults' types
+    # Its type hints know only its defaults' types
+    write_frames: Any = imageio_ffmpeg.write_frames
 
-    def write(path: Path, frames: Iterable[Frame], fps: float, size: tuple[int, int]) -> None:
+    def encode(path: Path, frames: Iterable[Frame], fps: float) -> None:
+        frames = iter(frames)
+        first = next(frames)
         # Macro blocks of 2 keep an even size as it is; the rest suits thin lines on an even ground
         encoder = write_frames(
             str(path),
-            size,
+            first.shape[1::-1],
             fps=fps,
             codec="libx264",
             quality=None,
@@ -271,20 +294,19 @@ def mp4_writer() -> Writer:
         )
         encoder.send(None)
         try:
-            for frame in frames:
+            for frame in itertools.chain([first], frames):
                 encoder.send(frame)
         finally:
             encoder.close()
 
-    return write
+    return encode
 
 
-def gif_writer() -> Writer:
-    """What writes frames as a .gif; raises ``DependencyNotInstalled`` where pillow is missing."""
+def _gif_encoder() -> Encoder:
     with needs_extra("render"):
         from PIL import Image
 
-    def write(path: Path, frames: Iterable[Frame], fps: float, size: tuple[int, int]) -> None:
+    def encode(path: Path, frames: Iterable[Frame], fps: float) -> None:
         # One palette for all frames: colours do not flicker, and what stays the same costs next to nothing
         pictures = (Image.fromarray(frame) for frame in frames)
         first = next(pictures).quantize(128, dither=Image.Dither.NONE)
@@ -298,4 +320,4 @@ def gif_writer() -> Writer:
             optimize=True,  # takes pixels that stay the same out of a frame: a third of the size
         )
 
-    return write
+    return encode

@@ -10,8 +10,10 @@ export interface Exhibit {
   readonly id: string;
   readonly title: string;
   readonly subtitle: string;
-  /** Whether arrow keys steer, space pushes, and steps can be taken one at a time. */
+  /** Whether it takes steps, one at a time. */
   readonly isWalk: boolean;
+  /** Whether arrow keys to the left and right do anything. */
+  readonly isSteered: boolean;
   enter(settings: Settings): void;
   leave(): void;
   /** Let time pass, in units of the exhibit's model; zero while paused. `real`: seconds since the last frame. */

@@ -99,7 +99,7 @@ async function main(): Promise<void> {
     tabs.get(exhibit)!.scrollIntoView({ block: "nearest", inline: "center" });
     byId("panel-title").textContent = exhibit.title;
     byId("panel-subtitle").textContent = exhibit.subtitle;
-    transport.setWalk(exhibit.isWalk);
+    transport.setKind(exhibit.isWalk, exhibit.isSteered);
     share.setWalk(exhibit.isWalk);
     exhibit.enter(from);
     if (!playing) exhibit.frame(0, 0);

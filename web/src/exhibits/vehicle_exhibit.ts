@@ -41,6 +41,7 @@ const degrees = (value: number) => `${number((value * 180) / Math.PI, 1)}°`;
 /** What skateboard and bicycle share; `State` begins with the lean. */
 abstract class VehicleExhibit implements Exhibit {
   readonly isWalk = false;
+  readonly isSteered = true;
   abstract readonly id: string;
   abstract readonly title: string;
   abstract readonly subtitle: string;

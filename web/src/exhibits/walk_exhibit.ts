@@ -78,8 +78,8 @@ export const VARIETIES: Record<Kind, Variety> = {
     knobs: ["foot_radius", "slope"],
     defaults: { ...PASSIVE, foot_radius: 0, slope: 0.009 },
     ranges: { slope: [0.0005, 0.02, 0.0001] },
-    nudge: [0.004, 0],
-    push: [0.012, 0],
+    nudge: [0.001, 0],
+    push: [0.002, 0],
     presets: [["Point feet", { foot_radius: 0, slope: 0.009 }], ["Round feet", { foot_radius: 0.5, slope: 0.004 }], ["Limping (steeper)", { foot_radius: 0, slope: 0.0165 }]],
     story: "No motor, no control: a slope gives the energy that every heel strike takes. Steeper than about 0.015 the gait doubles its period: it limps.",
     guess: [0, 0.2, 0, -0.2, 0, 0.016],
@@ -171,6 +171,7 @@ const TOUR: Lesson[] = [
 
 export class WalkExhibit implements Exhibit {
   readonly isWalk = true;
+  readonly isSteered: boolean;
   readonly id: string;
   readonly title: string;
   readonly subtitle: string;
@@ -205,6 +206,7 @@ export class WalkExhibit implements Exhibit {
 
   constructor(private readonly app: App, readonly kind: Kind) {
     this.variety = VARIETIES[kind];
+    this.isSteered = kind === "steered";
     this.id = this.variety.id;
     this.title = this.variety.title;
     this.subtitle = this.variety.subtitle;

@@ -56,7 +56,7 @@ export function shapeOf(p: Parameters, pose: Pose): WalkerShape {
   const r = p.foot_radius;
   const ankleAxis: Vector = [Math.sin(p.ankle_tilt), -Math.cos(p.ankle_tilt), 0];
   const ahead: Vector = [Math.cos(pose.heading), 0, -Math.sin(pose.heading)];
-  const centre = add([pose.contact[0], r, pose.contact[1]], ahead, -r * pose.pitch);
+  const centre = footCentre(r, pose, ahead);
   const foot = composed(rotation([0, 1, 0], pose.heading), rotation([0, 0, 1], pose.pitch));
   const leg = composed(foot, rotation(ankleAxis, pose.ankle));
   const ankle = add(centre, foot[1], -r);
@@ -77,6 +77,15 @@ export function shapeOf(p: Parameters, pose: Pose): WalkerShape {
   const [left, right] = pose.side === 1 ? [stance, swing] : [swing, stance];
   const masses: [Vector, Vector] = [add(left.hip, axle, pose.offset), add(right.hip, axle, pose.offset)];
   return { left, right, axle, masses, centre: add(masses[0], add(masses[1], masses[0], -1), 0.5) };
+}
+
+/** The middle of the stance foot's cylinder. A foot of a walker that has fallen tips over its end, where the model's cylinder rolls on. */
+function footCentre(radius: number, pose: Pose, ahead: Vector): Vector {
+  const reach = pose.hasFallen ? halfArc(radius) : Infinity;
+  const rolled = Math.min(Math.max(pose.pitch, -reach), reach);
+  const tipped = pose.pitch - rolled;
+  const back = -radius * (rolled + Math.sin(tipped));
+  return add([pose.contact[0], radius * Math.cos(tipped), pose.contact[1]], ahead, back);
 }
 
 /** The ankle angle within a quarter turn that lays the cylinder's axis level; zero where there is none. */

@@ -275,9 +275,9 @@ export class Walk {
 
   private isUp(track: Track, row: number): boolean {
     const [pitch, ankle] = [track.value(row, 1), track.value(row, 2)];
-    if (!(Math.abs(pitch) < 1.6 && Math.abs(ankle) < 2.2)) return false;
+    if (!(Math.abs(pitch) < 2.2 && Math.abs(ankle) < 2.2)) return false;
     const { side, contact, interLeg, offset } = this.current;
-    const pose: Pose = { heading: 0, pitch, ankle, side, contact, interLeg, retraction: 0, offset };
+    const pose: Pose = { heading: 0, pitch, ankle, side, contact, interLeg, retraction: 0, offset, hasFallen: true };
     return Math.min(...shapeOf(this.current.parameters, pose).masses.map((mass) => mass[1])) > LYING_HEIGHT;
   }
 
@@ -295,6 +295,7 @@ export class Walk {
       ankle: track.cubic(within, 2, this.kind === "steered" ? AT.ankle_rate : PASSIVE.ankle_rate),
       side: this.current.side,
       contact: this.current.contact,
+      hasFallen: fallen,
     };
     if (this.kind !== "steered") {
       const share = Math.min(within / Math.max(this.current.duration, 1e-9), 1);

@@ -122,4 +122,5 @@ export interface Pose {
   offset: number;
   /** Contact reference point: downhill, right. */
   contact: [number, number];
+  hasFallen: boolean;
 }

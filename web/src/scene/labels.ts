@@ -53,23 +53,24 @@ export class Labels {
       for (const { name, x, y } of mine) {
         const top = Math.max(y - 14, lowest + GAP);
         lowest = top;
-        const left = Math.min(Math.max(middle + side * reach, 70), width - 70);
-        this.write(name, left, top, side);
-        this.draw(x, y, left - side * 2, top);
+        const word = this.word(name);
+        const room = word.offsetWidth + 6;
+        const at = Math.min(Math.max(middle + side * reach, side < 0 ? room : 6), side < 0 ? width - 6 : width - room);
+        word.style.transform = `translate(${side < 0 ? "-100%" : "0"}, -50%) translate(${at.toFixed(1)}px, ${top.toFixed(1)}px)`;
+        this.draw(x, y, at - side * 2, top);
       }
     }
     for (const [name, word] of this.words) word.hidden = !names.some(([each]) => each === name);
   }
 
-  private write(name: string, x: number, y: number, side: number): void {
+  private word(name: string): HTMLElement {
     let word = this.words.get(name);
     if (!word) {
       word = h("span", {}, name);
       this.words.set(name, word);
       this.place.append(word);
     }
-    word.className = side < 0 ? "left" : "right";
-    word.style.transform = `translate(${side < 0 ? "-100%" : "0"}, -50%) translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+    return word;
   }
 
   private draw(x1: number, y1: number, x2: number, y2: number): void {

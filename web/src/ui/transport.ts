@@ -38,7 +38,7 @@ export class Transport {
   private readonly rateInput: HTMLInputElement;
   private readonly rateOutput: HTMLOutputElement;
   private readonly namesButton: HTMLButtonElement;
-  private readonly walkOnly: HTMLElement[] = [];
+  private readonly stepButton: HTMLButtonElement;
   private readonly held = new Set<string>();
 
   constructor(place: HTMLElement, stage: HTMLElement, private readonly actions: Actions) {
@@ -57,7 +57,7 @@ export class Transport {
       ...VIEWS.map(([value, name]) => h("option", { value }, name)));
     const names = button("names", "Names of the parts (N)", () => this.toggleNames(), "names");
     this.namesButton = names;
-    this.walkOnly.push(step);
+    this.stepButton = step;
     place.append(
       button("reset", "Start again (R)", () => actions.reset(), "reset"), this.playButton, step,
       h("span", { class: "rate" }, h("label", { for: "rate" }, "speed"), this.rateInput, this.rateOutput),
@@ -68,10 +68,10 @@ export class Transport {
     this.touch();
   }
 
-  /** Only a walk has steps, pushes and steering. */
-  setWalk(isWalk: boolean): void {
-    byId("touch").classList.toggle("off", !isWalk);
-    this.walkOnly[0].hidden = !isWalk;
+  /** Only a walk has steps; not everything can be steered. */
+  setKind(isWalk: boolean, isSteered: boolean): void {
+    byId("touch").classList.toggle("off", !isSteered);
+    this.stepButton.hidden = !isWalk;
   }
 
   private toggleNames(): void {
