@@ -51,7 +51,7 @@ h1 { font-size: 1.7rem; line-height: 1.25; } h2 { margin-top: 2.6rem; font-size:
 table { border-collapse: collapse; width: 100%; margin: 1rem 0; font-size: .87rem; }
 th, td { text-align: left; vertical-align: top; padding: .35rem .6rem;
          border-bottom: 1px solid #e4e0d6; font-variant-numeric: tabular-nums; }
-th { background: #efece4; }
+th { background: #efece4; } td:nth-child(8) { min-width: 16rem; }
 img { max-width: 100%; background: white; border: 1px solid #e4e0d6; border-radius: 4px; }
 p:has(> img) { margin-bottom: .4rem; } p:has(> img) + p { font-size: .87rem; color: #5c5e66; margin-top: 0; }
 .verdict { white-space: nowrap; border-radius: 3px; padding: .05rem .4rem; }
@@ -170,7 +170,7 @@ def as_markdown(reproduction: Reproduction) -> str:
     parts = [
         f"# {_title(reproduction)}",
         " ".join([*introductions, _VERDICTS]),
-        f"{len(reproduction.checks)} checks: {counts}.",
+        f"**{len(reproduction.checks)} checks: {counts}.**",
     ]
     disagreeing = [check for check in reproduction.checks if not check.agrees]
     if disagreeing:
@@ -208,7 +208,7 @@ def as_html(reproduction: Reproduction) -> str:
                 data = pictures[str(child.attrs["src"])].read_bytes()
                 child.attrSet("src", f"data:image/png;base64,{base64.b64encode(data).decode()}")
     body = parser.renderer.render(tokens, parser.options, {})
-    links = "".join(f'<a href="#{name}">{name}</a>' for name in names.values())
+    links = " ".join(f'<a href="#{name}">{name}</a>' for name in names.values())
     body = body.replace("</h1>", f"</h1>\n<nav>{links}</nav>", 1)
     for verdict in VERDICTS:
         span = f'<span class="verdict {verdict.replace(" ", "-")}">{verdict}</span>'
