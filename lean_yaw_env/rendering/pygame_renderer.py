@@ -48,7 +48,7 @@ class Renderer:
         with needs_extra("render"):
             import pygame
         self._pygame: Any = pygame
-        self._canvas = Canvas(*self.size, BACKGROUND)
+        self._canvas = Canvas(self.size, BACKGROUND)
         self._window: Any = None
         self._clock: Any = None
         self._closed_by_user = False
