@@ -240,7 +240,8 @@ class Stance:
             rows, bottom = np.vstack([rows, _INTER_LEG_ROW]), np.append(bottom, 0.0)
         corner = np.zeros((len(rows), len(rows)))
         matrix = np.block([[weighted @ positions, -rows.T], [rows, corner]])
-        solution = np.linalg.solve(matrix, np.concatenate([weighted @ top, bottom]))
+        right_side = np.concatenate([weighted @ top, bottom])
+        solution = np.asarray(np.linalg.solve(matrix, right_side), dtype=np.float64)
         return solution[:N_COORDINATES], solution[N_COORDINATES:]
 
     def _named(self, multipliers: Vector) -> ContactForces:

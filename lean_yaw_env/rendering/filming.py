@@ -85,8 +85,8 @@ def film(
     require_number("seconds_per_time_unit", seconds_per_time_unit, 0.0, 100.0, "(]")
     require_number("swing_share", swing_share, 0.0, 1.0)
     renderer = Renderer(size)
-    command = {"inter_leg_angle": inter_leg_angle, "mass_offset": mass_offset}
-    start = {"state": state, "stance": stance, "previous_offset": previous_offset}
+    command: dict[str, Any] = {"inter_leg_angle": inter_leg_angle, "mass_offset": mass_offset}
+    start: dict[str, Any] = {"state": state, "stance": stance, "previous_offset": previous_offset}
     walk = walker.walk(n_steps, **start, **command)
     commanded = None
     if commanded_heading is not None:
