@@ -59,12 +59,8 @@ def table_1_gait() -> LimitCycle:
 
 @lru_cache(maxsize=32)
 def passive_gait(walker: PassiveWalker) -> LimitCycle:
-    """Its gait of the longer of the two usual periods, which alone can be stable.
-
-    Some walkers have a third gait, whose leg swings to and fro once more within a step.
-    """
-    found = find_passive_gaits(walker)
-    return found[max(len(found) - 2, 0)]
+    """Its gait of the longest period, which alone can be stable."""
+    return find_passive_gaits(walker)[0]
 
 
 @dataclass(frozen=True)
