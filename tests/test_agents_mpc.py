@@ -12,7 +12,7 @@ from agents.controllers.mpc import MpcController
 from agents.controllers.mpc_rollouts import Rollouts
 from agents.controllers.mpc_settings import MpcSettings, PlanSpread
 from agents.controllers.simple import FixedController
-from agents.evaluation.footprint_pictures import record_episode
+from agents.evaluation.recording import record_episode
 from agents.evaluation.scoring import run_seeds
 from agents.seeds import TUNING_SEEDS
 from agents.settings import tuned

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.simulation import Simulation
-from lean_yaw_env.envs.tasks import Task, task_named
+from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.validation import require_count
@@ -37,19 +36,10 @@ def run_episodes(
 
     Parameters
     ----------
-    agent : Agent
-    task : str
-    episodes : 1 to ``MOST_EPISODES``
-    seed : int >= 0
-        Another seed draws other episodes.
-    options : EnvOptions
-        The environment's.
-    progress : called with the number of episodes that have just ended, optional
-
-    Raises
-    ------
-    ValueError
-        If a number is out of its range.
+    agent, task, options : who walks, at which task, under which options
+    episodes : 1 to ``MOST_EPISODES``, or ``ValueError``
+    seed : int >= 0, or ``ValueError``
+    progress : called with the number of episodes that have just ended
     """
     total = require_count("episodes", episodes, 1, MOST_EPISODES)
     first = evaluation_seed(seed)
@@ -110,13 +100,13 @@ def _run_chunk(
     chosen = EnvOptions() if options is None else options
     task = task_named(task_name)
     n = len(seeds)
-    env = WalkerVectorEnv(n, task_name, step_info=False, copy=False, **_arguments(chosen))
+    env = WalkerVectorEnv(n, task_name, step_info=False, copy=False, **vars(chosen))
     observations, _ = env.reset(seed=list(seeds))
     attach(agent, env)
     ended = np.zeros(n, dtype=np.bool_)
     survived = np.zeros(n, dtype=np.bool_)
     returns = np.zeros(n)
-    metrics = {name: np.full(n, np.nan) for name in _metric_names(task)}
+    metrics = {name: np.full(n, np.nan) for name in (RETURN, *task.metrics, SPEED)}
     state: State = None
     starts = np.ones(n, dtype=np.bool_)
     while not ended.all():
@@ -138,10 +128,6 @@ def _run_chunk(
     return Episodes(survived, metrics)
 
 
-def _metric_names(task: Task) -> tuple[str, ...]:
-    return (RETURN, *task.metrics, SPEED)
-
-
 def _metrics(simulation: Simulation, ended: NDArray[np.bool_]) -> dict[str, Vector]:
     """The task's metrics of ended episodes, from their records; NaN where there was nothing to measure."""
     walkers, tasks = simulation.walkers[ended], simulation.tasks[ended]
@@ -149,8 +135,3 @@ def _metrics(simulation: Simulation, ended: NDArray[np.bool_]) -> dict[str, Vect
     time = walkers["time"]
     nowhere = np.full(len(time), np.nan)
     return found | {SPEED: np.divide(walkers["distance"], time, out=nowhere, where=time > 0.0)}
-
-
-def _arguments(options: EnvOptions) -> dict[str, Any]:
-    """Options as an environment's keyword arguments."""
-    return dict(vars(options))

@@ -16,7 +16,7 @@ from lean_yaw_env.validation import require_count
 
 from ..agent import Agent
 from ..evaluation.episodes import Row
-from ..evaluation.footprint_pictures import save_agents_footprints
+from ..evaluation.pictures import save_agents_footprints
 from ..evaluation.row_tables import rows_to_plain
 from ..evaluation.scoring import evaluate
 from ..policies.policy import Policy, package_versions
