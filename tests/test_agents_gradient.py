@@ -16,7 +16,7 @@ from agents.learning.algorithms import settings_for, train
 from agents.learning.apg import GradientSettings, make_policy
 from agents.learning.differentiable import (
     DifferentiableWalkers,
-    Window,
+    Steps,
     bounded,
     time_discounted_returns,
 )
@@ -254,7 +254,7 @@ def test_jacobians_of_steps_agree_with_differences_of_steps(task):
 # --- returns
 
 
-def window_of(durations, rate=1.0, terminated=None, truncated=None) -> Window:
+def window_of(durations, rate=1.0, terminated=None, truncated=None) -> Steps:
     """One walker's window of steps that earn a rate of reward."""
     durations = torch.as_tensor(durations, dtype=torch.float64)[:, None]
     none = torch.zeros_like(durations, dtype=torch.bool)
@@ -263,7 +263,7 @@ def window_of(durations, rate=1.0, terminated=None, truncated=None) -> Window:
         if step is not None:
             end[step] = True
     empty = torch.zeros(len(durations), 1, 1)
-    return Window(empty, empty, rate * durations, durations, ends[0], ends[1])
+    return Steps(empty, empty, rate * durations, durations, *ends, durations, durations)
 
 
 @pytest.mark.parametrize("trace", [0.0, 0.7, 1.0])
