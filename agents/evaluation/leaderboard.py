@@ -14,7 +14,7 @@ from lean_yaw_env.files import write_text
 from ..agent import Agent
 from ..policies.policy import package_versions
 from ..registry import AgentRequest, agent_entry, env_id_of, make_agent
-from ..seeds import evaluation_seed
+from ..seeds import first_seed
 from .comparison import Expectation, ResultsByAgent, by_task, compared_rows, expectations_of
 from .episodes import RETURN, SURVIVAL, Results, Row, direction, is_share, metric_row
 from .intervals import CONFIDENCE, RESAMPLES
@@ -64,6 +64,7 @@ def make_leaderboard(
     ValueError
         If a number is bad, or an agent cannot be made.
     """
+    evaluation = replace(evaluation, episode_set="test")
     found = evaluation.run([*candidates, *level_candidates(candidates)])
     results = by_task(found[: len(candidates)])
     rows = compared_rows(results, evaluation.processes)
@@ -109,7 +110,7 @@ def level_rows(found: Sequence[Results]) -> dict[float, list[Row]]:
 
 
 def save_footprints(candidates: Sequence[Candidate], images: Path, *, seed: int = 0) -> None:
-    """Write a picture for each task, ``footprints_<task>.png``: the agents on its first episode."""
+    """Write a picture for each task, ``footprints_<task>.png``: the agents on its first validation episode."""
     images.mkdir(parents=True, exist_ok=True)
     for task in dict.fromkeys(candidate.task for candidate in candidates):
         present = [candidate for candidate in candidates if candidate.task == task]
@@ -117,7 +118,7 @@ def save_footprints(candidates: Sequence[Candidate], images: Path, *, seed: int 
             {candidate.agent: _first_agent(candidate, seed) for candidate in present},
             task,
             images / f"footprints_{task.lower()}.png",
-            seed=evaluation_seed(seed),
+            seed=first_seed("validation", seed),
             options=present[0].options,
         )
 
@@ -125,7 +126,7 @@ def save_footprints(candidates: Sequence[Candidate], images: Path, *, seed: int 
 def _first_agent(candidate: Candidate, seed: int) -> Agent:
     """The agent; of several trainings the first."""
     env_id, folder = env_id_of(candidate.task), candidate.folders[0]
-    request = AgentRequest(env_id, candidate.options, evaluation_seed(seed), folder, None)
+    request = AgentRequest(env_id, candidate.options, seed, folder, None)
     return make_agent(candidate.agent, request)
 
 

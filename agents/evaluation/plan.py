@@ -35,7 +35,7 @@ from ..registry import (
     names_for,
     policy_folders,
 )
-from ..seeds import MOST_EPISODES, evaluation_seed
+from ..seeds import MOST_EPISODES, EpisodeSet, first_seed
 from .episodes import Episodes, Results
 from .scoring import run_seeds
 
@@ -98,6 +98,7 @@ class Evaluation:
     """Of each agent, for each of its trainings."""
     costly_episodes: int = 40
     """Of an agent that plans, at most: the first of the others'."""
+    episode_set: EpisodeSet = "validation"
     seed: int = 0
     """Another draws other episodes."""
     options: EnvOptions = field(default_factory=EnvOptions)
@@ -164,7 +165,7 @@ class Evaluation:
 
     def _chunks(self, candidate: Candidate) -> list[_Chunk]:
         size = _COSTLY_CHUNK if _plans(candidate.agent) else _CHUNK
-        first = evaluation_seed(self.seed)
+        first = first_seed(self.episode_set, self.seed)
         seeds = range(first, first + candidate.episodes)
         return [
             _Chunk(candidate, folder, seeds[start : start + size])

@@ -15,7 +15,7 @@ from lean_yaw_env.parameters import Vector
 from lean_yaw_env.validation import require_count
 
 from ..agent import Agent, State, attach
-from ..seeds import MOST_EPISODES, evaluation_seed
+from ..seeds import MOST_EPISODES, EpisodeSet, first_seed
 from .episodes import RETURN, SPEED, Episodes, Results, Row, summary
 
 _CHUNK = 1024  # walkers stepped together
@@ -29,10 +29,11 @@ def run_episodes(
     *,
     episodes: int,
     seed: int = 0,
+    episode_set: EpisodeSet = "validation",
     options: EnvOptions | None = None,
     progress: Progress | None = None,
 ) -> Episodes:
-    """Run an agent through episodes; which, depends on ``seed`` alone.
+    """Run an agent through episodes; which, depends on ``episode_set`` and ``seed`` alone.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def run_episodes(
     progress : called with the number of episodes that have just ended
     """
     total = require_count("episodes", episodes, 1, MOST_EPISODES)
-    first = evaluation_seed(seed)
+    first = first_seed(episode_set, seed)
     return run_seeds(agent, task, range(first, first + total), options=options, progress=progress)
 
 
@@ -54,7 +55,7 @@ def run_seeds(
     options: EnvOptions | None = None,
     progress: Progress | None = None,
 ) -> Episodes:
-    """Run an agent through one episode for each environment seed; for episodes to judge it by, see ``run_episodes``."""
+    """Run an agent through one episode for each environment seed; for those of an evaluation, see ``run_episodes``."""
     parts = [
         _run_chunk(agent, task, seeds[start : start + _CHUNK], options, progress)
         for start in range(0, len(seeds), _CHUNK)
@@ -71,7 +72,7 @@ def evaluate(
     options: EnvOptions | None = None,
     progress: Progress | None = None,
 ) -> list[Row]:
-    """Run every agent through the same episodes; one row for each metric of each agent, ``survival`` last.
+    """Run every agent through the same validation episodes; one row for each metric of each agent, ``survival`` last.
 
     Raises
     ------

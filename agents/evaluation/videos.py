@@ -19,7 +19,7 @@ from lean_yaw_env.validation import require_number
 
 from ..agent import Agent
 from ..registry import AgentRequest, agent_entry, env_id_of, make_agent, names_for
-from ..seeds import evaluation_seed
+from ..seeds import first_seed
 from .recording import SAMPLES, RecordedEpisode, record_episode
 
 SWING_SHARE = 0.6
@@ -45,7 +45,7 @@ def film_agent(
     name: str = "",
     progress: bool = False,
 ) -> str | None:
-    """Film the first seconds of an episode that is kept for evaluation.
+    """Film the first seconds of a validation episode.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def film_agent(
     renderer = Renderer(size)
     per_second = speed / SECONDS_PER_TIME_UNIT
     most = seconds * per_second
-    first = evaluation_seed(seed)
+    first = first_seed("validation", seed)
     episode = record_episode(agent, task, seed=first, options=options, most_time=most)
     end = episode.steps[-1].end
     times = np.arange(0.0, min(end, most), per_second / file.rate)
