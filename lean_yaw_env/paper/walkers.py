@@ -83,12 +83,6 @@ def circling_gait() -> LimitCycle:
     return gait_of(circling_walker(), mass_offset=LARGE_OFFSET)
 
 
-@lru_cache(maxsize=32)
-def passive_gait(walker: PassiveWalker) -> LimitCycle:
-    """Its gait of the longest period, which alone can be stable."""
-    return find_passive_gaits(walker)[0]
-
-
 @dataclass(frozen=True)
 class FlatGait:
     """A flat walker's gait, which is a planar one whatever the ankle tilt.
