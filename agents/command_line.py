@@ -188,7 +188,7 @@ def evaluate(
     as_json: Annotated[bool, Option("--json", help="Print rows as JSON instead of tables.")] = False,
 ) -> None:  # fmt: skip
     """Run agents through the same seeded episodes and print interquartile means with 95 % intervals, survival beside error."""
-    from .evaluation.comparison import compared_rows, samples_by_task
+    from .evaluation.comparison import by_task, compared_rows
     from .evaluation.leaderboard import make_leaderboard, save_footprints
     from .evaluation.plan import Evaluation
     from .evaluation.row_tables import show
@@ -212,8 +212,7 @@ def evaluate(
         save_footprints(candidates, pictures, seed=seed)
         return
     if out is None:
-        samples = samples_by_task([each.results for each in evaluation.run(candidates)])
-        rows = compared_rows(samples, evaluation.processes)
+        rows = compared_rows(by_task(evaluation.run(candidates)), evaluation.processes)
     else:
         rows = make_leaderboard(candidates, evaluation, out, command_as_typed())
     show(rows, Console(), as_json=as_json)
@@ -257,8 +256,8 @@ def closed_loop(
     as_json: AsJson = False,
 ) -> None:  # fmt: skip
     """Analyse walker and agent as one dynamical system: gait, eigenvalues, basins of attraction, largest pushes survived, contact forces and work."""
-    from .evaluation.closed_loop import examine_all, show, write_report
-    from .evaluation.closed_loop_report import plain
+    from .evaluation.closed_loop_page import show, write_report
+    from .evaluation.closed_loop_report import examine_all, plain
 
     names = names_in([agents])
     if not names:

@@ -14,13 +14,13 @@ from lean_yaw_env.files import read_json, write_json
 from lean_yaw_env.validation import require_count
 
 from ..evaluation.episodes import Row
-from ..evaluation.footprint_pictures import save_agents_footprints
+from ..evaluation.pictures import save_agents_footprints
 from ..evaluation.row_tables import rows_to_plain
 from ..evaluation.scoring import evaluate
 from ..policies.policy import Policy, package_versions
 from ..policies.policy_files import CARD_FILE, options_from_plain, options_to_plain, save, task_of
 from ..registry import AgentRequest, env_id_of, make_all
-from ..seeds import MOST_EPISODES, evaluation_seed, training_seed
+from ..seeds import MOST_EPISODES, first_seed, training_seed
 from ..settings import with_values
 from .algorithms import ALGORITHMS, settings_for, train
 from .curves import save_learning_curve
@@ -34,8 +34,6 @@ CURVE_FILE = "learning_curve.png"
 FOOTPRINTS_FILE = "footprints.png"
 EVALUATION_FILE = "evaluation.json"
 STATISTICS_FILE = "observation_statistics.json"
-EVALUATION = 0
-"""Seed of the evaluation episodes, the same for all runs, so that only the training differs."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +123,7 @@ def make_run(training: Training, folder: Path) -> None:
         "options": options_to_plain(training.options),
         "versions": package_versions(),
         "walkers_seed": training_seed(training.seed),
-        "evaluation_seed": evaluation_seed(EVALUATION),
+        "evaluation_seed": first_seed("validation"),
     }
     write_json(folder / RUN_FILE, record)
 
@@ -193,12 +191,12 @@ def run(folder: Path, *, progress: bool = True, report: Report | None = None) ->
     with tqdm(total=total, desc="evaluating", unit="episode", disable=not progress) as bar:
         rows = evaluate(
             task, agents,
-            episodes=training.episodes, seed=EVALUATION, options=training.options, progress=bar.update,
+            episodes=training.episodes, options=training.options, progress=bar.update,
         )  # fmt: skip
     title = f"{training.algorithm.upper()} on {task}, seed {training.seed}: {steps:,} steps in {log.seconds:.0f} s"
     save_learning_curve(log, rows, training.algorithm, title, steps, folder / CURVE_FILE)
     save_agents_footprints(
-        agents, task, folder / FOOTPRINTS_FILE, seed=evaluation_seed(EVALUATION), options=training.options
+        agents, task, folder / FOOTPRINTS_FILE, seed=first_seed("validation"), options=training.options
     )  # fmt: skip
     write_json(folder / EVALUATION_FILE, rows_to_plain(rows))  # last: it marks the run as finished
     return FinishedRun(policy, rows)

@@ -26,7 +26,7 @@ from ..agent import Agent
 from ..evaluation.scoring import run_seeds
 from ..learning.algorithms import train
 from ..registry import env_id_of
-from ..seeds import MOST_EPISODES, TRAINING_SEEDS, TUNING_SEEDS
+from ..seeds import MOST_EPISODES, TRAINING_SEEDS, first_seed
 from ..settings import values_of
 from .spaces import Space, space_of
 
@@ -248,7 +248,8 @@ def _settings(trial: optuna.Trial, space: Space) -> Any:
 
 
 def _mean_return(agent: Agent, tuning: Tuning, options: EnvOptions | None = None) -> float:
-    seeds = range(TUNING_SEEDS, TUNING_SEEDS + tuning.episodes)
+    first = first_seed("validation")
+    seeds = range(first, first + tuning.episodes)
     return float(run_seeds(agent, tuning.task, seeds, options=options).metrics["return"].mean())
 
 
