@@ -18,6 +18,7 @@ from .agent import Agent
 from .controllers.guidance import guided
 from .controllers.mpc import MpcController
 from .controllers.simple import FixedController, HeadingFeedback, RandomController
+from .observations import ObservationLayout
 from .policies.policy_files import (
     CARD_FILE,
     DEFAULT_ALGORITHM,
@@ -57,6 +58,10 @@ class AgentEntry:
     tasks: tuple[str, ...] = ALL_TASKS
 
 
+def _layout(request: AgentRequest) -> ObservationLayout:
+    return ObservationLayout.of(task_of(request.env_id), request.options)
+
+
 def _feedback(request: AgentRequest) -> Agent:
     return HeadingFeedback(task_of(request.env_id), request.options)
 
@@ -83,8 +88,8 @@ def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
 
 
 AGENTS: dict[str, AgentEntry] = {
-    "random": AgentEntry("baseline", lambda request: RandomController(request.seed)),
-    "fixed": AgentEntry("baseline", lambda request: FixedController()),
+    "random": AgentEntry("baseline", lambda asked: RandomController(asked.seed, _layout(asked))),
+    "fixed": AgentEntry("baseline", lambda asked: FixedController(_layout(asked))),
     "feedback": AgentEntry("feedback", _feedback, ("Heading", "SpeedHeading", "UTurn", "Level")),
     "lqr": AgentEntry("feedback", _lqr),
     "mpc": AgentEntry("planner", _mpc, tuple(TASK_VERSIONS)),

@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 import inspect
-import os
 import re
 import sys
 from collections.abc import Iterable
@@ -31,6 +30,7 @@ from lean_yaw_env.envs.observation import (
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.reset import BODY_DEVIATIONS, HELD_OUT_REACH, START_DEVIATIONS
 from lean_yaw_env.envs.tasks import Task, task_named
+from lean_yaw_env.files import write_text
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, PARAMETER_NAMES, STATE_FIELDS
 from lean_yaw_env.registration import NAMESPACE, TASK_VERSIONS
 
@@ -192,10 +192,7 @@ def renewed(page: str) -> str:
 def main(path: str) -> None:
     """Renew a page's generated parts in place."""
     page = Path(path)
-    text = renewed(page.read_text(encoding="utf-8"))
-    beside = page.with_suffix(".tmp")
-    beside.write_text(text, encoding="utf-8")
-    os.replace(beside, page)
+    write_text(page, renewed(page.read_text(encoding="utf-8")))
 
 
 if __name__ == "__main__":
