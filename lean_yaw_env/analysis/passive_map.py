@@ -111,7 +111,7 @@ class PassiveMap(SectionMap):
                     displacement=result.displacement,
                     least_normal_force=result.least_normal_force,
                     greatest_friction=result.greatest_friction,
-                    gravity_work=result.gravity_work,
+                    gravity_work=result.energy.gravity_work,
                     shift_work=0.0,
                 )
             )

@@ -13,7 +13,7 @@ from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.parameters import Foot, Vector
 from lean_yaw_env.rendering.geometry import Pose, walker_shape
-from lean_yaw_env.rendering.pygame_renderer import LEAST_SIZE, Renderer
+from lean_yaw_env.rendering.pygame_renderer import Renderer
 from lean_yaw_env.rendering.scene import Goal, Scene, status_lines
 
 RENDER_FPS = 4
@@ -27,10 +27,6 @@ class Footage:
     def __init__(self, simulation: Simulation, row: int = 0) -> None:
         self._simulation = simulation
         self._row = row
-        self.restart()
-
-    def restart(self) -> None:
-        """Forget the walk so far."""
         self._footprints: list[tuple[float, float]] = []
         self._headings: list[float] = []
         self._feet: list[Foot] = []
@@ -59,6 +55,11 @@ class Footage:
         kind = self._simulation.task
         command = None if kind.heading_field is None else float(task[kind.heading_field])
         time = float(walker.time)
+        wanted = command  # or where the goal in force is from here, which may be beyond the picture
+        if command is None and self._goal_places:
+            downhill, right = np.subtract(self._goal_places[-1], self._path[-1])
+            wanted = math.atan2(-right, downhill)
+        reached = len(self._goal_places) - 1
         return Scene(
             parameters=self._simulation.body_parameters(self._row),
             pose=self._pose(walker),
@@ -66,8 +67,11 @@ class Footage:
             headings=np.array(self._headings),
             feet=tuple(self._feet),
             path=np.array(self._path),
-            commanded_heading=self._goal_direction() if command is None else command,
-            goals=self._goals(),
+            commanded_heading=wanted,
+            goals=[
+                Goal(*place, kind.goal_radius, reached=k < reached)
+                for k, place in enumerate(self._goal_places)
+            ],
             reference_path=None
             if kind.reference_path is None
             else kind.reference_path(walker, task),
@@ -81,20 +85,6 @@ class Footage:
             ),
         )
 
-    def _goal_direction(self) -> float | None:
-        """Where the goal in force is from here, which may be beyond the picture."""
-        if not self._goal_places:
-            return None
-        downhill, right = np.subtract(self._goal_places[-1], self._path[-1])
-        return math.atan2(-right, downhill)
-
-    def _goals(self) -> list[Goal]:
-        """The goals reached so far, and the one in force."""
-        return [
-            Goal(x, z, self._simulation.task.goal_radius, reached=k < len(self._goal_places) - 1)
-            for k, (x, z) in enumerate(self._goal_places)
-        ]
-
     def _pose(self, walker: Any) -> Pose:
         return Pose(
             state=self._simulation.states[self._row].copy(),
@@ -106,24 +96,18 @@ class Footage:
 
 
 class Gallery:
-    """A picture of each of a simulation's walkers, small enough to stand side by side.
+    """Pictures of each of a simulation's walkers.
 
     Raises
     ------
-    ValueError
-        If there are more than ``MOST_PICTURES`` walkers.
     gymnasium.error.DependencyNotInstalled
         If pygame is not installed.
     """
 
-    def __init__(self, simulation: Simulation) -> None:
-        if simulation.n > MOST_PICTURES:
-            raise ValueError(
-                f"render_mode draws at most {MOST_PICTURES} walkers, got num_envs={simulation.n}"
-            )
+    def __init__(self, simulation: Simulation, renderer: Renderer) -> None:
+        self.renderer = renderer
         self._simulation = simulation
-        self._renderer = Renderer(LEAST_SIZE)
-        self._walks: list[Footage | None] = [None] * simulation.n
+        self._walks: dict[int, Footage] = {}
 
     def restart(self, mask: NDArray[np.bool_]) -> None:
         """Forget the walks of these walkers, whose episodes have just begun."""
@@ -133,15 +117,12 @@ class Gallery:
     def extend(self, mask: NDArray[np.bool_]) -> None:
         """Take in the step that these walkers have just made."""
         for row in np.flatnonzero(mask).tolist():
-            walk = self._walks[row]
-            if walk is not None:
-                walk.extend()
+            self._walks[row].extend()
+
+    def scene(self, row: int) -> Scene:
+        """What there is to draw of a walker."""
+        return self._walks[row].scene(FallCode(self._simulation.falls[row]).word)
 
     def frames(self) -> tuple[NDArray[np.uint8], ...]:
         """A picture of each walker, (height, width, 3)."""
-        falls = self._simulation.falls.tolist()
-        return tuple(
-            self._renderer.frame(walk.scene(FallCode(fall).word))
-            for walk, fall in zip(self._walks, falls, strict=True)
-            if walk is not None
-        )
+        return tuple(self.renderer.frame(self.scene(row)) for row in sorted(self._walks))
