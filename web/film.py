@@ -1,6 +1,6 @@
-"""The film at the top of the README: the walker on the page's stage, steered by an agent and pushed; needs Playwright and Chromium.
+"""The film at the top of the README: an agent steers the walker on the page's stage, and it recovers from a push.
 
-``python web/film.py`` writes ``docs/images/walking.webp``.
+``python web/film.py`` writes ``docs/images/walking.webp`` in a few minutes. It needs Playwright and Chromium (``pip install -e '.[web]'``).
 """
 
 from __future__ import annotations
@@ -8,128 +8,145 @@ from __future__ import annotations
 import argparse
 import base64
 import io
-import json
 import math
 import shutil
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
+from playwright.sync_api import sync_playwright
+from tqdm import tqdm
 
+import agents
 import lean_yaw_env  # noqa: F401 - registers the environments
-from agents import AgentRequest, make_agent
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.rendering.motion import SECONDS_PER_TIME_UNIT
+from lean_yaw_env.rendering.palette import INK
 from lean_yaw_env.viewer import PageServer
 from lean_yaw_env.walker import Walk
 
-ENV_ID = "LeanYaw/Heading-v0"
 OUT = Path(__file__).parents[1] / "docs" / "images" / "walking.webp"
-SIZE = (720, 420)
-FPS = 20
-SLOW_MOTION = 0.5
-"""Of real time for legs of one metre on earth."""
-HEADINGS = {0: 0.0, 13: 0.55, 24: -0.45}
-"""What is commanded from which step on, rad."""
-PUSHES = {6: 0.16, 33: -0.18}
-"""Pushes to the side at heel strikes: what they add to the ankle rate. A stance of the right foot is pushed to the other side."""
-STEPS = 42
-# What a browser needs to draw in software
-BROWSER = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]  # fmt: skip
-STAGE_ALONE = """
+ENV_ID = "LeanYaw/Heading-v0"
+STEPS = 27
+PUSHES = {4: -0.3}
+"""What is added to the ankle rate at the heel strike before a step: below zero, a push to the left."""
+HEADINGS = {10: -0.8}
+"""What is commanded from a step on, rad; straight downhill before."""
+CAPTIONS = {0: "It stays up by steering", 4: "A push to the left", 6: "It turns into its fall, and recovers", 10: "Now it is told to turn right"}  # fmt: skip
+
+SIZE = (800, 450)
+FPS = 16
+SPEED = 0.75
+"""Times real time for legs of a metre on earth."""
+DISTANCE, HEIGHT = 1.95, 0.42
+"""Of the camera from what it looks at, leg lengths."""
+START_ANGLE, TURN = 2.45, 1.75
+"""Of the camera from where the walker heads, to the right, rad: at the start and end, and how far it goes forward between."""
+_BROWSER = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]  # fmt: skip
+_STAGE_ALONE = """
 #bar, #panel, #transport, #hud, #notice, #touch, #labels { display: none !important }
 #main { display: block !important } #view { position: fixed !important; inset: 0 }
 """
-# Draws a frame and returns it; the camera goes round the walker while it follows it
-FRAME = """([duration, real, [ahead, up, right], pushes]) => {
-  const { stage } = leanYaw, walker = leanYaw.active();
-  const index = walker.walk.records.length;
-  walker.frame(duration, real);
-  const now = walker.walk.records.length;
-  if (now > index && pushes[now]) walker.arrow.show(Math.sign(pushes[now]), 0, 2.0);
-  const target = stage.controls.target, turn = stage.heading;
-  const c = Math.cos(turn), s = Math.sin(turn);
-  stage.camera.position.set(target.x + c * ahead + s * right, target.y + up, target.z + c * right - s * ahead);
-  stage.camera.lookAt(target);
+_PREPARE = """
+requestAnimationFrame = () => 0;
+leanYaw.stage.setCovered(0, 0);
+leanYaw.stage.resize();
+leanYaw.stage.setQuality(0);
+"""
+_FRAME = """([duration, seconds, [ahead, up, right], pushes]) => {
+  const { stage } = leanYaw, exhibit = leanYaw.active(), before = exhibit.walk.records.length;
+  exhibit.frame(duration, seconds);
+  const step = exhibit.walk.records.length;
+  if (step > before && pushes[step]) exhibit.arrow.show(Math.sign(pushes[step]), 0, 1.6);
+  const { target } = stage.controls, cosine = Math.cos(stage.heading), sine = Math.sin(stage.heading);
+  stage.camera.position.set(target.x + cosine * ahead + sine * right, target.y + up, target.z + cosine * right - sine * ahead);
   stage.controls.update();
   stage.render();
-  return stage.canvas.toDataURL("image/png").split(",")[1];
+  return [step, stage.canvas.toDataURL("image/png").split(",")[1]];
 }"""
 
 
-def walk_of_agent(name: str) -> Walk:
+def walk_of(agent_name: str) -> Walk:
     """The walk of an agent that follows the headings and is pushed."""
-    env: Any = gym.make(ENV_ID, horizon=math.inf, max_episode_steps=None).unwrapped
-    agent = make_agent(name, AgentRequest(ENV_ID, EnvOptions()))
+    env: Any = gym.make(ENV_ID, horizon=1e6, max_episode_steps=None).unwrapped
+    agent = agents.make_agent(agent_name, agents.AgentRequest(ENV_ID, EnvOptions()))
     observation, info = env.reset(seed=0, options={"stance": "left", "command": 0.0})
-    infos, state = [], None
+    starts, ends, memory = [], [], None
     for step in range(STEPS):
-        kept = env.get_state()
-        if step in PUSHES:
-            kept["walkers"]["ankle_rate"] += PUSHES[step]
-        if step in HEADINGS:
-            kept["tasks"]["command"] = HEADINGS[step]
-        env.set_state(kept)
-        print(step, info["state"], kept["walkers"]["ankle_rate"])
-        infos.append(info | {"state": np.array(env.simulation.states[0])})
-        action, state = agent.predict(observation, state, np.array(step == 0), True)
-        observation, _, fallen, _, info = env.step(action)
-        assert not fallen, f"the walker fell at step {step}"
-    infos.append(info)
+        state = env.get_state()
+        state["walkers"]["ankle_rate"] += PUSHES.get(step, 0.0)
+        state["tasks"]["command"] = HEADINGS.get(step, state["tasks"]["command"])
+        env.set_state(state)
+        starts.append({**info, "state": np.array(env.simulation.states[0])})
+        action, memory = agent.predict(observation, memory, np.array(step == 0), True)
+        observation, _, terminated, _, info = env.step(action)
+        ends.append(info)
+        if terminated:
+            raise RuntimeError(f"{agent_name} fell in step {step}: choose another push")
+    strikes = [*starts, info]
     return Walk(
-        states=np.array([each["state"] for each in infos]),
-        stances=tuple("left" if each["stance_side"] > 0.0 else "right" for each in infos),
-        footprints=np.array([each["footprint"] for each in infos]),
-        durations=np.array([each["duration"] for each in infos[1:]]),
-        mass_offsets=np.array([each["mass_offset"] for each in infos]),
-        commands=np.array([[each["inter_leg_angle"], each["commanded_offset"]] for each in infos[1:]]),
-        energies=(), path=np.empty((0, 4)), fall=None, parameters=env.simulation.body_parameters(0),
-    )  # fmt: skip
+        states=np.array([each["state"] for each in strikes]),
+        stances=tuple("left" if each["stance_side"] > 0.0 else "right" for each in strikes),
+        footprints=np.array([each["footprint"] for each in strikes]),
+        durations=np.array([each["duration"] for each in ends]),
+        mass_offsets=np.array([each["mass_offset"] for each in strikes]),
+        commands=np.array([[each["inter_leg_angle"], each["commanded_offset"]] for each in ends]),
+        energies=(),
+        path=np.empty((0, 4)),
+        fall=None,
+        parameters=env.simulation.body_parameters(0),
+    )
 
 
-def frames(walk: Walk) -> list[Image.Image]:
-    from playwright.sync_api import sync_playwright
-
+def frames(walk: Walk) -> Iterator[Image.Image]:
+    """The walk as the page draws it, twice as fine and averaged, with captions."""
+    count = math.floor(walk.durations.sum() * SECONDS_PER_TIME_UNIT / SPEED * FPS)
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-    pictures = []
-    seconds = walk.durations.sum() * SECONDS_PER_TIME_UNIT / SLOW_MOTION
-    count = int(seconds * FPS) - 1
+    pushes = {str(step): push for step, push in PUSHES.items()}
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as running:
         saved = Path(folder) / "walk.json"
         walk.save(saved)
-        browser = running.chromium.launch(executable_path=chromium, args=BROWSER)
-        page = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]}, device_scale_factor=2)
+        browser = running.chromium.launch(executable_path=chromium, args=_BROWSER)
+        viewport: Any = dict(zip(("width", "height"), SIZE, strict=True))
+        page = browser.new_page(viewport=viewport, device_scale_factor=2)
         with PageServer(saved) as server:
             page.goto(server.address)
             page.wait_for_function("document.documentElement.dataset.ready")
-            page.evaluate("window.requestAnimationFrame = () => 0")
-            page.add_style_tag(content=STAGE_ALONE)
-            page.evaluate("leanYaw.stage.setCovered(0, 0); leanYaw.stage.resize(); leanYaw.active().start(); leanYaw.stage.setQuality(0)")
-            for k in range(count):
-                share = k / count
-                angle = 2.35 - 1.5 * math.sin(math.pi * share)
-                distance = 2.3
-                place = (distance * math.cos(angle), 0.62, distance * math.sin(angle))
-                duration = SLOW_MOTION / FPS / SECONDS_PER_TIME_UNIT
-                data = page.evaluate(FRAME, [duration, 1 / FPS, place, {str(i): p for i, p in PUSHES.items()}])
-                picture = Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")
-                pictures.append(picture.resize(SIZE, Image.Resampling.LANCZOS))
-                if k % 20 == 0: print(k, count, flush=True)
+            page.add_style_tag(content=_STAGE_ALONE)
+            page.evaluate(_PREPARE)
+            page.evaluate("leanYaw.active().start()")
+            for k in tqdm(range(count), unit="frame"):
+                angle = START_ANGLE - TURN * math.sin(math.pi * k / count) ** 2
+                place = [DISTANCE * math.cos(angle), HEIGHT, DISTANCE * math.sin(angle)]
+                duration = SPEED / FPS / SECONDS_PER_TIME_UNIT
+                step, picture = page.evaluate(_FRAME, [duration, 1.0 / FPS, place, pushes])
+                drawn = Image.open(io.BytesIO(base64.b64decode(picture))).convert("RGB")
+                yield _with_caption(drawn.resize(SIZE, Image.Resampling.LANCZOS), step)
         browser.close()
-    return pictures
+
+
+def _with_caption(picture: Image.Image, step: int) -> Image.Image:
+    words = CAPTIONS[max(first for first in CAPTIONS if first <= step)]
+    place = (0.04 * picture.width, 0.93 * picture.height)
+    font = ImageFont.load_default(0.045 * picture.height)
+    ImageDraw.Draw(picture).text(place, words, INK, font, anchor="ls")
+    return picture
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--agent", default="lqr", help="who steers (default: lqr)")
+    parser.add_argument("--out", type=Path, default=OUT, help="the film, a .webp or a .gif")
+    arguments = parser.parse_args()
+    first, *rest = frames(walk_of(arguments.agent))
+    how = {"duration": round(1000 / FPS), "loop": 0, "quality": 72, "method": 5}
+    first.save(arguments.out, save_all=True, append_images=rest, **how)
+    print(f"{arguments.out}: {arguments.out.stat().st_size / 1e6:.1f} MB")
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--agent", default="lqr")
-    parser.add_argument("--out", type=Path, default=OUT)
-    a = parser.parse_args()
-    walk = walk_of_agent(a.agent)
-    print(walk.headings.round(2), walk.durations.sum())
-    p = frames(walk)
-    import pickle; pickle.dump([np.asarray(x) for x in p], open("/tmp/draw/frames.pkl","wb"))
-    p[0].save(a.out, save_all=True, append_images=p[1:], duration=1000 // FPS, loop=0, quality=60, method=4)
-    print(a.out, a.out.stat().st_size)
+    main()

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.envs.info import InfoTables
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, action_space
-from lean_yaw_env.envs.pictures import MOST_PICTURES, RENDER_FPS, Gallery
+from lean_yaw_env.envs.pictures import MOST_PICTURES, STEPS_PER_SECOND, Gallery
 from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.envs.snapshots import PickledWithState, State, restore, state_of
 from lean_yaw_env.envs.tasks import Task, task_named
@@ -88,7 +88,7 @@ class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float
         self.metadata = {
             "autoreset_mode": self.autoreset_mode,
             "render_modes": list(_RENDER_MODES),
-            "render_fps": RENDER_FPS,
+            "render_fps": STEPS_PER_SECOND,
         }
         self.render_mode = render_mode
         self.copy = copy
