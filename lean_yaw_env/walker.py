@@ -50,7 +50,7 @@ class Fall(str, Enum):
     """The stance leg moves backward, faster than 0.1 rad per unit of time (a passive walker's at any rate), and speeds up: it does not
     pass mid-stance."""
     FORWARD = "forward"
-    """Of passive walkers: past mid-stance the leg tips over until the floor no longer holds it, and the swing foot is not down."""
+    """Of passive walkers: the leg tips over forward, the swing foot not down, until it is level or the floor no longer holds it."""
     SIDEWAYS = "sideways"
     """An ankle, of the stance foot or of the swing foot to be laid flat, would have to turn past a right angle, or the walker
     comes down on its swing foot without moving forward onto it, or (next to no hip width) foot and ankle come to move the masses
