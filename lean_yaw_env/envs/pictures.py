@@ -27,13 +27,7 @@ MOST_PICTURES = 64
 
 
 class Footage:
-    """One walker's walk so far, the first's by default, and scenes made of it.
-
-    Attributes
-    ----------
-    motion : StepMotion or None
-        Within the last step; None before the first.
-    """
+    """One walker's walk so far, the first's by default, and scenes made of it."""
 
     def __init__(self, simulation: Simulation, row: int = 0) -> None:
         self._simulation = simulation
@@ -43,7 +37,7 @@ class Footage:
         self._headings: list[float] = []
         self._feet: list[Foot] = []
         self._goal_places: list[tuple[float, float]] = []
-        self.motion: StepMotion | None = None
+        self._motion: StepMotion | None = None
         pose = self._pose()
         self._path = walker_shape(self._walker.parameters, pose).centre[None, [0, 2]]
         self._set_down(pose)
@@ -53,33 +47,38 @@ class Footage:
         """Take in the step that the walker has just made."""
         walker, _ = self._simulation.records(self._row)
         fall = FallCode(int(walker.fall))
-        if fall is FallCode.SOLVER:  # the walker stands where the step began
-            return
+        stays = fall is FallCode.SOLVER  # the walker stands where the step began
         self._before = self._after
-        self.motion = StepMotion(
+        self._motion = motion = StepMotion(
             self._walker,
             self._before.pose,
             inter_leg_angle=float(walker.inter_leg_angle),
             mass_offset=float(walker.commanded_offset),
-            duration=float(walker.duration),
+            duration=0.0 if stays else float(walker.duration),
         )
-        self._path = np.vstack([self._path, self.motion.path()])
-        pose = self.motion.pose(1.0)
+        self._path = np.vstack([self._path, motion.path()])
+        pose = motion.pose(1.0)
         if fall is FallCode.NONE:
             pose = self._pose()
             self._set_down(pose)
         self._after = self._scene(pose)
 
+    @property
+    def motion(self) -> StepMotion:
+        """The motion within the last step; there is none before the first."""
+        assert self._motion is not None, "the walk has not begun"
+        return self._motion
+
     def scene(self, share: float = 1.0) -> Scene:
         """What there is to draw after a share of the last step: at 1, just after the heel strike or where the walker fell."""
-        if share >= 1.0 or self.motion is None:
+        if share >= 1.0:
             return self._after
         path = np.vstack([self._before.path, self.motion.path(share)])
         return replace(self._before, pose=self.motion.pose(share), path=path)
 
     def shares(self) -> list[float]:
         """When in the last step a picture is due, ``FRAMES_PER_SECOND`` in real time, as shares of the step."""
-        if self.motion is None:
+        if self._motion is None:
             return [1.0]
         end = float(self._simulation.walkers["time"][self._row])
         rate, duration = FRAMES_PER_SECOND * SECONDS_PER_TIME_UNIT, self.motion.duration

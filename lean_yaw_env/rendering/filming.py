@@ -15,18 +15,11 @@ from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.files import require_ending, written_whole
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector
 from lean_yaw_env.rendering.geometry import Pose
-from lean_yaw_env.rendering.motion import (
-    SECONDS_PER_TIME_UNIT,
-    SWING_SHARE,
-    StepMotion,
-    swing_angle,
-)
+from lean_yaw_env.rendering.motion import SECONDS_PER_TIME_UNIT, SWING_SHARE, StepMotion
 from lean_yaw_env.rendering.pygame_renderer import SIZE, Renderer
 from lean_yaw_env.rendering.scene import Scene, status_lines
 from lean_yaw_env.validation import require_number
 from lean_yaw_env.walker import Walk, Walker
-
-__all__ = ["SECONDS_PER_TIME_UNIT", "FilmFile", "Frame", "film", "swing_angle"]
 
 HOLD_SECONDS = 1.0
 """How long a film stays with a walker that has fallen."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -46,7 +45,7 @@ class StepMotion:
         swing_share: float = SWING_SHARE,
     ) -> None:
         self._start = start
-        self._angles = (-start.inter_leg_angle, inter_leg_angle)
+        self._angles = start.inter_leg_angle, inter_leg_angle
         self._swing_share = swing_share
         self.duration = max(duration, 1e-6)  # a fall at the start of a step lasts no time
         motion = walker.stance_motion(
@@ -70,7 +69,7 @@ class StepMotion:
         return Pose(
             state=np.array([self._start.state[0], pitch, ankle, 0.0, 0.0]),
             stance=self._start.stance,
-            inter_leg_angle=swing_angle(self._angles, 1, share, self._swing_share),
+            inter_leg_angle=self._inter_leg_angle(share),
             mass_offset=offset,
             contact=self._start.contact,
         )
@@ -79,13 +78,10 @@ class StepMotion:
         """The centre of mass so far, (downhill, right); shape (k, 2)."""
         return self._centre[: math.floor(share * (_SAMPLES - 1)) + 1]
 
-
-def swing_angle(
-    angles: Sequence[float] | Vector, i: int, share: float, swing_share: float
-) -> float:
-    """The inter-leg angle as drawn in step ``i``: from where the old stance leg was left to the front."""
-    if i == 0 or share >= swing_share:
-        return float(angles[i])
-    s = share / swing_share
-    blend = s * s * s * (10.0 + s * (6.0 * s - 15.0))
-    return float(-angles[i - 1] + blend * (angles[i] + angles[i - 1]))
+    def _inter_leg_angle(self, share: float) -> float:
+        """As drawn: from where the swing leg comes from to the front."""
+        start, end = self._angles
+        if share >= self._swing_share:
+            return end
+        s = share / self._swing_share
+        return start + s * s * s * (10.0 + s * (6.0 * s - 15.0)) * (end - start)
