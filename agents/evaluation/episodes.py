@@ -25,7 +25,7 @@ class Episodes:
     Attributes
     ----------
     survived : bool, shape (episodes,)
-        Whether the time limit and nothing else ended it.
+        Whether the time limit or a success ended it.
     metrics : by name, each of shape (episodes,)
         ``return``, the task's metrics and ``speed`` (distance over time); NaN where an episode leaves one undefined.
     """
@@ -57,7 +57,7 @@ class Row:
     mean, low, high : float
         The mean, for a metric that is 0 or 1 the share, with its 95 % interval.
     survival : float
-        Share of the episodes that nothing but the time limit ended.
+        Share of the episodes that the time limit or a success ended.
     episodes : int
         Of each training.
     iqm, iqm_low, iqm_high : float

@@ -45,7 +45,7 @@ class EndedEpisode(NamedTuple):
     steps : environment steps of the training when it ended
     value : its return
     length : its steps
-    survived : whether only the time limit ended it
+    survived : whether the time limit or a success ended it
     """
 
     steps: int

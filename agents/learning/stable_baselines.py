@@ -82,7 +82,7 @@ class _Callback(BaseCallback):
         for i in np.flatnonzero(self.locals["dones"]):
             info = self.locals["infos"][i]
             episode = info["episode"]
-            survived = info["TimeLimit.truncated"]
+            survived = info["TimeLimit.truncated"] or bool(info.get("is_success", False))
             self._recorder.add(
                 EndedEpisode(self.num_timesteps, episode["r"], episode["l"], survived)
             )
