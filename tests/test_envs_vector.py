@@ -482,7 +482,6 @@ def test_too_many_walkers_to_draw_are_refused() -> None:
 
 
 def test_tensors_share_the_arrays_memory() -> None:
-    pytest.importorskip("array_api_compat")
     env = gym.wrappers.vector.NumpyToTorch(gym.make_vec("LeanYaw/Push-v0", num_envs=4))
     observations, info = env.reset(seed=1)
     assert observations.dtype == torch.float32

@@ -22,6 +22,7 @@ PROGRAMS = {
     name: "\n".join(BLOCK.findall(text))
     for name, text in SECTION.findall(PAGE.read_text(encoding="utf-8"))
 }
+RLLIB = "ray[rllib]>=2.60"
 
 # of each section: the modules that it needs beside the package, and what must hold after its program
 CHECKS = {
@@ -133,17 +134,38 @@ def test_a_library_s_program_runs(library: str, tmp_path: Path) -> None:
     run(f"{PROGRAMS[library]}\n{textwrap.dedent(checks)}", tmp_path)
 
 
-def test_rllib_s_program_runs_in_an_environment_of_its_own(tmp_path: Path) -> None:
-    """RLlib requires one exact version of Gymnasium. ``LEAN_YAW_RLLIB_PYTHON`` names the interpreter of an environment with RLlib and this package."""
-    python = os.environ.get("LEAN_YAW_RLLIB_PYTHON", sys.executable)
-    found = subprocess.run([python, "-c", "import ray.rllib, lean_yaw_env"], capture_output=True)
-    if found.returncode != 0:
-        pytest.skip(
-            "ray[rllib] is missing: install it with lean-yaw-env and torch in an environment, and name its interpreter in LEAN_YAW_RLLIB_PYTHON"
-        )
+@pytest.fixture(scope="module")
+def python_of_rllib(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The interpreter of an environment in which RLlib and its Gymnasium are installed, with this environment's other libraries."""
+    if importlib.util.find_spec("torchrl") is None:
+        pytest.skip("RLlib is not installed without the others: pip install 'lean-yaw-env[compat]'")
+    home = tmp_path_factory.mktemp("rllib")
+    own = [
+        sys.executable,
+        "-c",
+        "import lean_yaw_env, numpy; print(lean_yaw_env.__file__, numpy.__file__)",
+    ]
+    files = subprocess.check_output(own, cwd=home, text=True).split()
+    subprocess.run([sys.executable, "-m", "venv", home], check=True)
+    python = home / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    place = "import sysconfig; print(sysconfig.get_path('purelib'))"
+    libraries = Path(subprocess.check_output([python, "-c", place], text=True).strip())
+    folders = dict.fromkeys(str(Path(file).parents[1]) for file in files)
+    (libraries / "libraries.pth").write_text("\n".join(folders))
+    install = [python, "-m", "pip", "install", "--quiet", "--retries", "1", RLLIB]
+    done = subprocess.run(install, capture_output=True, text=True)
+    if done.returncode != 0:
+        pytest.skip(f"{RLLIB} cannot be installed: {done.stderr.splitlines()[-1:]}")
+    return python
+
+
+def test_rllib_s_program_runs_in_an_environment_of_its_own(
+    python_of_rllib: Path, tmp_path: Path
+) -> None:
+    """RLlib requires one exact version of Gymnasium, another one than the newest."""
     checks = """
     if __name__ == "__main__":
-        assert result["num_env_steps_sampled_lifetime"] >= 256
         assert result["training_iteration"] == 1
+        assert result["num_env_steps_sampled_lifetime"] >= 256
     """
-    run(f"{PROGRAMS['RLlib']}\n{textwrap.dedent(checks)}", tmp_path, python)
+    run(f"{PROGRAMS['RLlib']}\n{textwrap.dedent(checks)}", tmp_path, python_of_rllib)
