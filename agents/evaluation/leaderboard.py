@@ -33,7 +33,7 @@ package) are pooled.
 
 - **iqm** is the interquartile mean: the mean of the middle half of all episodes. It does not show what happens in fewer than a quarter of the
   episodes, such as rare falls. The table therefore also gives the mean of the return.
-- **survival** is the share of episodes that only the time limit ended. Errors are averaged over the time before a fall; the error of an agent that
+- **survival** is the share of episodes that the time limit or a success ended. Errors are averaged over the time before a fall; the error of an agent that
   often falls means little without its survival.
 - Brackets contain {confidence:.0%} confidence intervals: bootstrap intervals ({resamples} resamples) for means, Wilson intervals for shares. The
   bootstrap resamples the episodes and, if there are several, the trainings. Such an interval is valid for another training on other episodes.
