@@ -31,6 +31,13 @@ app.command()(tune)
 app.command()(ship)
 
 Runs = Annotated[Path, typer.Option(help="Where trainings left their folders.")]
+EnvOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="An option of the environment as NAME=VALUE, for example random_body=training or hidden_rates=true. May be repeated.",
+        show_default=False,
+    ),
+]
 AgentPath = Annotated[
     Path | None,
     typer.Option(
@@ -103,15 +110,35 @@ def evaluate(
             show_default=False,
         ),
     ] = None,
+    option: EnvOption = None,
+    results: Annotated[
+        Path | None,
+        typer.Option(
+            help="Also write each agent's episodes into this folder, a JSON file for each task and agent.",
+            show_default=False,
+        ),
+    ] = None,
+    others: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="A file that --results wrote elsewhere: its agent enters the leaderboard of --out. May be repeated.",
+            show_default=False,
+        ),
+    ] = None,
     json: Annotated[
         bool, typer.Option("--json", help="Print rows as JSON instead of tables.")
     ] = False,
 ) -> None:
-    """Run agents through the same seeded episodes and print interquartile means with 95 % intervals, survival beside error."""
-    from .evaluation.comparison import by_task, compared_rows
+    """Run agents through the same validation episodes and print means with 95 % intervals; with --out, write the leaderboard on the test episodes.
+
+    --agent-path is the folder of a run, or of an agent of your own: see docs/enter_your_agent.md.
+    """
+    from .evaluation.comparison import by_task, compared_rows, rivals_of
     from .evaluation.leaderboard import make_leaderboard, save_footprints
     from .evaluation.plan import Evaluation
+    from .evaluation.results_files import read_results, write_results
     from .evaluation.row_tables import show
+    from .options import env_options
 
     given = names_in([*(agents or []), *(more_agents or [])])
     names = [] if ALL in given else given
@@ -121,6 +148,7 @@ def evaluate(
             episodes=episodes,
             costly_episodes=costly_episodes,
             seed=seed,
+            options=env_options(option or ()),
             path=agent_path,
             runs=None if out is not None and agent_path is None else runs,
             cache=runs / CACHE if cache is None and (out or len(tasks) > 1) else cache,
@@ -132,9 +160,19 @@ def evaluate(
             save_footprints(candidates, pictures, seed=seed)
             return
         if out is None:
-            rows = compared_rows(by_task(evaluation.run(candidates)), evaluation.processes)
+            found = evaluation.run(candidates)
+            compared = by_task(found)
+            rows, _ = compared_rows(compared, rivals_of(compared), evaluation.processes)
         else:
-            rows = make_leaderboard(candidates, evaluation, out, command_as_typed())
+            if option:
+                raise ValueError(
+                    "option must not be given with --out: a leaderboard is of the tasks as they are"
+                )
+            entered = [read_results(file, "test", seed) for file in others or ()]
+            rows, found = make_leaderboard(candidates, evaluation, out, command_as_typed(), entered)
+        if results is not None:
+            for each in found:
+                write_results(each, results, "validation" if out is None else "test", seed)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     except KeyboardInterrupt as interruption:

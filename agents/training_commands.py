@@ -68,6 +68,13 @@ def train(
     tensorboard: Annotated[
         bool, typer.Option("--tensorboard", help="Write TensorBoard's logs into the run's folder.")
     ] = False,
+    option: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="An option of the environment as NAME=VALUE, for example random_body=training or hidden_rates=true. May be repeated.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Train an agent on a task, compare it with random actions, the fixed controller and feedback, and write the results under runs/.
 
@@ -76,10 +83,15 @@ def train(
     from .evaluation.row_tables import show
     from .learning.runs import run
     from .learning.series import RunError, is_series
+    from .options import env_options
 
     console = Console()
+    try:
+        options = env_options(option) if option else None
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
     given = {
-        "seed": seed, "steps": steps, "episodes": episodes, "threads": threads,
+        "seed": seed, "options": options, "steps": steps, "episodes": episodes, "threads": threads,
         "algorithm": algorithm, "tensorboard": tensorboard or None,
     }  # fmt: skip
     chosen = {name: value for name, value in given.items() if value is not None}
