@@ -127,7 +127,10 @@ def test_kept_episodes_of_an_entry_are_run_again_when_its_code_has_changed(folde
         ({"tasks": ["Fly"]}, "task must be one of"),
         ({"trainings": ["three"]}, "three', which does not exist"),
         ({"format_version": 2}, "must have format 'lean-yaw-agent' and format_version 1"),
-        ({"colour": "red"}, "must be an object with format, format_version, name, tasks, trainings"),
+        (
+            {"colour": "red"},
+            "must be an object with format, format_version, name, tasks, trainings",
+        ),
     ],
 )
 def test_a_bad_description_is_refused_by_name(folder: Path, change: dict, message: str):
@@ -162,6 +165,10 @@ def test_a_results_file_holds_every_episode_bit_for_bit(folder: Path, tmp_path: 
         ({"options": {"slope": 0.1}}, "options in .* must be {}"),
         ({"env_id": "LeanYaw/Walk-v7"}, "this package's environment is LeanYaw/Walk-v"),
         ({"trainings": [{}]}, "is damaged"),
+        (
+            {"trainings": [{"survived": [True], "metrics": {"return": [1.0]}}]},
+            "must hold .* of every episode",
+        ),
     ],
 )
 def test_results_of_other_episodes_do_not_enter(tmp_path: Path, change: dict, message: str):

@@ -23,8 +23,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import root
 
 from lean_yaw_env.analysis.active_map import ActiveMap, has_downhill
-from lean_yaw_env.analysis.fixed_point import RESIDUAL_LIMIT, solve_fixed_point
+from lean_yaw_env.analysis.fixed_point import solve_fixed_point
 from lean_yaw_env.analysis.path import distance_walked
+from lean_yaw_env.analysis.section_map import RESIDUAL_LIMIT
 from lean_yaw_env.analysis.step_derivatives import StepDerivatives, differentiate_step
 from lean_yaw_env.envs.formulas import advance
 from lean_yaw_env.envs.options import gait_of

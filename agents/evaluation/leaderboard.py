@@ -12,6 +12,7 @@ from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.files import write_text
 
 from ..policies.policy import package_versions
+from ..registry import AGENTS
 from ..seeds import first_seed
 from .comparison import ENTERED, Claim, best_feedback, by_task, compared_rows, kind_of
 from .episodes import SURVIVAL, Results, Row, direction, is_share, metric_row
@@ -69,6 +70,10 @@ def make_leaderboard(
     ValueError
         If a number is bad, or an agent cannot be made.
     """
+    known = {(each.task, each.agent) for each in candidates}
+    for each in others:
+        if (each.task, each.agent) in known or each.agent in AGENTS:
+            raise ValueError(f"results must be of another agent, got some of {each.agent!r} again")
     rivals = fixed_rivals(candidates, evaluation)
     evaluation = replace(evaluation, episode_set="test")
     found = evaluation.run([*candidates, *level_candidates(candidates)])

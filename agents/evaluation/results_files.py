@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.files import read_json, write_text
 from lean_yaw_env.parameters import Vector
 
@@ -15,7 +16,7 @@ from ..policies.policy import package_versions
 from ..policies.policy_files import options_to_plain, require_env_id, task_of
 from ..registry import env_id_of
 from ..seeds import EpisodeSet
-from .episodes import Episodes, Results
+from .episodes import RETURN, SPEED, Episodes, Results
 
 FORMAT, FORMAT_VERSION = "lean-yaw-results", 1
 
@@ -71,6 +72,15 @@ def read_results(path: Path, episode_set: EpisodeSet, seed: int) -> Results:
             for run in record["trainings"]
         )
         task = task_of(require_env_id(record["env_id"]))
+        metrics = {RETURN, *task_named(task).metrics, SPEED}
+        if any(
+            set(run.metrics) != metrics
+            or any(each.shape != run.survived.shape for each in run.metrics.values())
+            for run in runs
+        ):
+            raise ValueError(
+                f"{str(path)!r} must hold {', '.join(sorted(metrics))} of every episode"
+            )
         return Results(task, record["agent"], runs, seconds=float(record["seconds"]))
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"{str(path)!r} is damaged: {error}") from error

@@ -19,6 +19,7 @@ from rich import box
 from rich.table import Table
 from tqdm import tqdm
 
+from lean_yaw_env.errors import LeanYawError
 from lean_yaw_env.files import read_json, write_json, write_text
 from lean_yaw_env.validation import require_count
 
@@ -44,7 +45,7 @@ SEEDS_FILE = "seeds.csv"
 _MOST_COLUMNS = 5  # seeds shown one by one: more do not fit a terminal
 
 
-class RunError(RuntimeError):
+class RunError(LeanYawError):
     """A run whose process failed; what it wrote stays and can be resumed."""
 
 

@@ -62,7 +62,7 @@ class _Handler(SimpleHTTPRequestHandler):
 
 
 class PageServer:
-    """The page on a port of the loopback interface, served until closed; a context manager.
+    """The page on a port of the loopback interface, at ``address``, served until closed; a context manager.
 
     Parameters
     ----------
@@ -70,11 +70,6 @@ class PageServer:
         A walk saved by ``Walk.save``, which the page opens.
     port : [0, 65535]
         0 takes any free one.
-
-    Attributes
-    ----------
-    address : str
-        Of the page.
 
     Raises
     ------
@@ -113,18 +108,7 @@ class PageServer:
 
 
 def view(walk: str | Path | None = None, *, port: int = 0, open_browser: bool = True) -> PageServer:
-    """Serve the page on this machine only, and open it in the browser.
-
-    Parameters
-    ----------
-    walk, port : see ``PageServer``
-    open_browser : bool
-
-    Raises
-    ------
-    FileNotFoundError, OSError
-        As ``PageServer``.
-    """
+    """Serve the page on this machine only, and open it in the browser. Arguments and errors as for ``PageServer``."""
     server = PageServer(walk, port=port)
     if open_browser:
         webbrowser.open(server.address)
