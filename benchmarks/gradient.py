@@ -22,7 +22,7 @@ from tqdm import tqdm
 
 from agents.evaluation.scoring import run_episodes
 from agents.learning.algorithms import settings_for, train
-from agents.learning.recorder import Arrays, read_checkpoint
+from agents.learning.recorder import State, read_checkpoint
 from agents.observations import ObservationLayout
 from agents.policies.policy import Policy, PolicyCard
 from agents.policies.policy_files import save, task_of
@@ -76,11 +76,11 @@ class Watch:
         now = time.process_time()
         self._clock[steps] = now - self._began - self._paused
         if self._file.exists():
-            arrays = read_checkpoint(self._file)
-            done = int(arrays["count.steps"])
+            state = read_checkpoint(self._file)
+            done = int(state["steps"])
             last = self._curve.steps[-1] if self._curve.steps else 0
             if done in self._clock and done >= last + self._every:
-                self.note(done, self._clock[done], policy_in(self._env_id, self._algorithm, arrays))
+                self.note(done, self._clock[done], policy_in(self._env_id, self._algorithm, state))
         self._paused += time.process_time() - now
 
     def finish(self, steps: int, policy: Policy) -> None:
@@ -95,17 +95,17 @@ class Watch:
         self._curve.returns.append(round(float(episodes.metrics["return"].mean()), 3))
 
 
-def policy_in(env_id: str, algorithm: str, arrays: Arrays) -> Policy:
+def policy_in(env_id: str, algorithm: str, state: State) -> Policy:
     """The policy within a training's checkpoint."""
     layout = ObservationLayout.of(task_of(env_id), EnvOptions())
     if algorithm == "ppo":
-        names = ["policy.mlp_extractor.policy_net.0", "policy.mlp_extractor.policy_net.2", "policy.action_net"]  # fmt: skip
-        mean, variance = arrays["observations.mean"], arrays["observations.var"]
+        names = ["mlp_extractor.policy_net.0", "mlp_extractor.policy_net.2", "action_net"]
+        mean, variance = state["observations"]["mean"], state["observations"]["var"]
     else:
-        names = ["policy.0", "policy.2", "policy.4"]
+        names = ["0", "2", "4"]
         mean, variance = np.zeros(len(layout.names)), np.ones(len(layout.names))
     weights = {
-        f"layers.{k}.{part}": arrays[f"{name}.{part}"]
+        f"layers.{k}.{part}": state["policy"][f"{name}.{part}"]
         for k, name in enumerate(names)
         for part in ("weight", "bias")
     }

@@ -81,7 +81,7 @@ def test_an_interrupted_training_resumes_bit_for_bit(
     with pytest.raises(Interruption):
         begin()
     monkeypatch.setattr(stable_baselines._Callback, "_on_step", original)
-    assert int(read_checkpoint(checkpoint)["count.steps"]) == moment
+    assert int(read_checkpoint(checkpoint)["steps"]) == moment
     np.random.seed(99)  # noqa: NPY002 - the resumed training must not depend on it
     torch.manual_seed(99)
     resumed = begin()

@@ -15,21 +15,20 @@ from agents.command_line import app
 from agents.evaluation import plan
 from agents.evaluation.comparison import (
     best_feedback,
+    by_agent,
     compare,
     expectations_of,
-    samples_of,
     task_rows,
 )
 from agents.evaluation.episodes import RETURN, SURVIVAL, Episodes, Results, is_share
-from agents.evaluation.footprint_pictures import record_episode
 from agents.evaluation.leaderboard import (
-    Circumstances,
     leaderboard_page,
     level_candidates,
     level_rows,
     make_leaderboard,
 )
-from agents.evaluation.plan import Candidate, Evaluation, run_all
+from agents.evaluation.plan import Candidate, Evaluation
+from agents.evaluation.recording import record_episode
 from agents.evaluation.scoring import run_episodes
 from agents.registry import (
     AGENTS,
@@ -49,6 +48,10 @@ from lean_yaw_env.rendering.palette import AGENT_COLOURS
 
 SHORT = EnvOptions(horizon=8.0)
 EPISODES = 6
+
+
+def run_all(candidates: list[Candidate], **arguments) -> list[Results]:
+    return Evaluation(progress=False, **arguments).run(candidates)
 
 
 def walked(task: str, agent: str, returns: np.ndarray, **metrics: np.ndarray) -> Results:
@@ -71,7 +74,7 @@ def returns(mean: float, trainings: int = 1) -> np.ndarray:
     return mean + episodes + noise
 
 
-SAMPLES = samples_of(
+SAMPLES = by_agent(
     [
         walked("Heading", "random", returns(10.0)),
         walked("Heading", "fixed", returns(12.0)),
@@ -111,7 +114,7 @@ def test_of_an_error_less_is_better():
         walked("Heading", name, returns(5.0), **{error: value * np.ones((1, 60))})
         for name, value in (("lqr", 0.1), ("fixed", 0.3))
     )
-    samples = samples_of([low, high])
+    samples = by_agent([low, high])
     assert compare(samples["lqr"], samples["fixed"], error).verdict == "better"
 
 
@@ -119,13 +122,13 @@ def test_a_mean_and_an_interquartile_mean_that_disagree_are_called_mixed():
     steady = walked("Heading", "lqr", np.full((1, 60), 10.0))
     failing = np.full((1, 60), 10.1)
     failing[0, :8] = 0.0  # better in most episodes, and falls in some
-    samples = samples_of([steady, walked("Heading", "fixed", failing)])
+    samples = by_agent([steady, walked("Heading", "fixed", failing)])
     assert compare(samples["fixed"], samples["lqr"], RETURN).verdict == "mixed"
 
 
 def test_an_agent_that_walked_fewer_episodes_is_compared_on_those():
     few = walked("Heading", "feedback", returns(19.0)[:, :20])
-    samples = samples_of([SAMPLES["lqr"].results, few])
+    samples = by_agent([SAMPLES["lqr"], few])
     comparison = compare(samples["feedback"], samples["lqr"], RETURN)
     assert comparison.episodes == 20
     assert comparison.verdict == "worse"
@@ -135,10 +138,7 @@ def test_rows_say_against_whom_and_leave_undefined_episodes_uncompared():
     holed = returns(12.0)
     holed[0, 3] = np.nan
     results = walked("Heading", "fixed", returns(12.0), settled_fraction=holed)
-    rows = {
-        (row.agent, row.metric): row
-        for row in task_rows(samples_of([results, SAMPLES["lqr"].results]))
-    }
+    rows = {(row.agent, row.metric): row for row in task_rows(by_agent([results, SAMPLES["lqr"]]))}
     assert rows["fixed", RETURN].against == "lqr"
     assert rows["fixed", RETURN].verdict == "worse"
     assert rows["fixed", "settled_fraction"].verdict is None
@@ -174,7 +174,7 @@ def test_learned_agents_are_there_where_a_training_is_found(tmp_path: Path):
 
 def test_episodes_walked_in_parts_are_those_of_one_evaluation(monkeypatch):
     monkeypatch.setattr(plan, "_CHUNK", 4)
-    found = run_all([Candidate("Walk", "fixed", EPISODES, SHORT)], seed=3)[0].results
+    found = run_all([Candidate("Walk", "fixed", EPISODES, SHORT)], seed=3)[0]
     whole = run_episodes(FixedController(), "Walk", episodes=EPISODES, seed=3, options=SHORT)
     for name, values in whole.metrics.items():
         assert np.array_equal(found.values(name)[0], values)
@@ -199,7 +199,7 @@ def test_an_interrupted_evaluation_goes_on_and_loses_nothing(tmp_path: Path, mon
     again = run_all(candidates, cache=tmp_path)
     assert len(calls) == 3  # the first agent's are not walked again
     for one, other in zip(expected, again, strict=True):
-        assert np.array_equal(one.results.values(RETURN), other.results.values(RETURN))
+        assert np.array_equal(one.values(RETURN), other.values(RETURN))
     assert run_all(candidates, cache=tmp_path)[0].seconds == again[0].seconds
     assert len(calls) == 3
 
@@ -224,14 +224,14 @@ def test_a_damaged_file_is_walked_again(tmp_path: Path):
     first = run_all([candidate], cache=tmp_path)[0]
     next(tmp_path.iterdir()).write_bytes(b"PK damaged")
     again = run_all([candidate], cache=tmp_path)[0]
-    assert np.array_equal(first.results.values(RETURN), again.results.values(RETURN))
+    assert np.array_equal(first.values(RETURN), again.values(RETURN))
 
 
 def test_two_processes_give_the_results_of_one(monkeypatch):
     monkeypatch.setattr(plan, "_WORTH_PROCESSES", 2)
     candidates = [Candidate("Walk", name, 3, SHORT) for name in ("fixed", "random")]
     for one, two in zip(run_all(candidates), run_all(candidates, processes=2), strict=True):
-        assert np.array_equal(one.results.values(RETURN), two.results.values(RETURN))
+        assert np.array_equal(one.values(RETURN), two.values(RETURN))
 
 
 def test_push_levels_are_walked_by_the_agents_of_push_alone():
@@ -244,19 +244,22 @@ def test_push_levels_are_walked_by_the_agents_of_push_alone():
 
 def test_a_recorded_episode_keeps_goals_and_path():
     waypoint = record_episode(FixedController(), "Waypoint", seed=1, most_steps=5)
-    assert not waypoint.goals[-1].reached
-    assert waypoint.goals[0].radius == 0.5
+    assert not waypoint.scene.goals[-1].reached
+    assert waypoint.scene.goals[0].radius == 0.5
     slalom = record_episode(FixedController(), "Slalom", seed=1, most_steps=5)
-    assert slalom.reference_path is not None and slalom.reference_path.shape[1] == 2
-    assert not slalom.goals
-    assert record_episode(RandomController(0), "Walk", seed=1, most_steps=5).reference_path is None
+    assert slalom.scene.reference_path is not None and slalom.scene.reference_path.shape[1] == 2
+    assert not slalom.scene.goals
+    assert (
+        record_episode(RandomController(0), "Walk", seed=1, most_steps=5).scene.reference_path
+        is None
+    )
 
 
 def test_a_random_body_s_path_is_walked_by_that_body():
     options = EnvOptions(random_body="training", start_disturbance=0.0)
     episode = record_episode(FixedController(), "Walk", seed=3, options=options, most_steps=6)
-    assert episode.body != EnvOptions().walker_parameters(task_named("Walk"))
-    walker = Walker(episode.body)
+    assert episode.scene.parameters != EnvOptions().walker_parameters(task_named("Walk"))
+    walker = Walker(episode.scene.parameters)
     # the path in a step ends where that body's own step takes it: at the time of the next heel strike
     env = WalkerEnv("Walk", **vars(options))
     _, info = env.reset(seed=3)
@@ -292,15 +295,14 @@ def test_the_leaderboard_holds_every_agent_and_the_command_that_made_it(tmp_path
 
 
 def test_a_page_says_plainly_what_does_not_hold():
-    samples = samples_of(
+    samples = by_agent(
         [
             walked("Heading", "lqr", returns(20.0)),
             walked("Heading", "ppo", returns(20.0, trainings=2) - 0.001),
             walked("Heading", "sac", returns(15.0, trainings=2)),
         ]
     )
-    made = Circumstances("make it", 0, 60.0, "a machine")
-    page = leaderboard_page(task_rows(samples), {"Heading": samples}, [], made)
+    page = leaderboard_page(task_rows(samples), {"Heading": samples}, {}, "Made by a test.")
     assert "no: no significant difference from lqr" in page
     assert "no: sac is worse than lqr" in page
     assert "**ppo** is better than the best feedback controller on no task" in page

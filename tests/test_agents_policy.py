@@ -249,12 +249,12 @@ def test_the_policy_taken_from_a_training_acts_as_the_trained_network(tmp_path):
     arrays = safetensors.numpy.load((tmp_path / "c.safetensors").read_bytes())
     names = ("mlp_extractor.policy_net.0", "mlp_extractor.policy_net.2", "action_net")
     observation = np.random.default_rng(0).normal(size=(20, FEATURES)).astype(np.float32)
-    normal = (observation - arrays["observations.mean"]) / np.sqrt(
-        arrays["observations.var"] + 1e-8
+    normal = (observation - arrays["observations/mean"]) / np.sqrt(
+        arrays["observations/var"] + 1e-8
     )
     signal = np.clip(normal, -10.0, 10.0)
     for k, name in enumerate(names):
-        signal = signal @ arrays[f"policy.{name}.weight"].T + arrays[f"policy.{name}.bias"]
+        signal = signal @ arrays[f"policy/{name}.weight"].T + arrays[f"policy/{name}.bias"]
         signal = np.tanh(signal) if k < 2 else np.clip(signal, -1.0, 1.0)
     # float32 against float64
     assert trained.policy.predict(observation)[0] == pytest.approx(signal, abs=1e-5)

@@ -7,7 +7,7 @@ for what it knows.
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,12 +31,6 @@ _FLOOR = 0.12  # least spread, as a share of the first: what is found early may 
 _DIRECTIONS = 3  # of ``PlanSpread``
 
 
-class HasSimulation(Protocol):
-    """An environment of walkers: ``WalkerEnv`` or ``WalkerVectorEnv``."""
-
-    simulation: Simulation
-
-
 class MpcController:
     """Plans some steps ahead at every step; ``attach`` it to the environment first.
 
@@ -45,19 +39,10 @@ class MpcController:
 
     Parameters
     ----------
-    task : str
-    options : EnvOptions
-        Those of the environment.
-    settings : MpcSettings, optional
-        Those kept for the task otherwise.
-    seed : int >= 0
-    base : Agent, optional
-        A controller without memory, whose plan is among those tried; the regulator otherwise, or for a walker without a gait the fixed one.
-
-    Raises
-    ------
-    ValueError
-        If the seed is not a whole number from 0 on.
+    task, options : the environment's
+    settings : those tuned for the task otherwise
+    seed : int >= 0, or ``ValueError``
+    base : a controller without memory, whose plan is among those tried; the regulator otherwise, or for a walker without a gait the fixed one
     """
 
     def __init__(
@@ -73,15 +58,11 @@ class MpcController:
         self._settings = tuned("mpc", task, MpcSettings()) if settings is None else settings
         self._seed = int(require_number("seed", seed, 0, 2**63))
         self._base = _regulator(task, self._options) if base is None else base
-        settings = self._settings
-        steps, knots = np.arange(settings.horizon), np.array(settings.knots)
-        self._steps_of_knots = np.stack(
-            [np.interp(steps, knots, row) for row in np.eye(len(knots))], axis=1
-        )
-        generator = np.random.default_rng((self._seed, 0))
-        self._tables = generator.standard_normal(
-            (_TABLES, settings.iterations, settings.samples, len(knots), _DIRECTIONS)
-        )
+        own, steps = self._settings, np.arange(self._settings.horizon)
+        weights = [np.interp(steps, own.knots, row) for row in np.eye(len(own.knots))]
+        self._steps_of_knots = np.stack(weights, axis=1)
+        sizes = (_TABLES, own.iterations, own.samples, len(own.knots), _DIRECTIONS)
+        self._tables = np.random.default_rng((self._seed, 0)).standard_normal(sizes)
         self._simulation: Simulation | None = None
         self._rollouts: Rollouts | None = None
 
@@ -93,8 +74,7 @@ class MpcController:
         ValueError
             If the environment is of another task or other options.
         """
-        inner: HasSimulation = getattr(env, "unwrapped", env)
-        simulation = inner.simulation
+        simulation: Simulation = getattr(env, "unwrapped", env).simulation
         if simulation.task.name != self._task:
             raise ValueError(f"env must be of task {self._task!r}, got {simulation.task.name!r}")
         if simulation.options != self._options:
@@ -163,7 +143,10 @@ class MpcController:
             plans = self._plans(centre, tried, block)
             if iteration == 0:
                 plans[:, 1] = base
-            worth = rollouts.worth(plans, block) - self._distrust(plans, base)
+            worth = rollouts.worth(plans, block)
+            if settings.trust:
+                strays = np.square(0.5 * (plans - base[:, None])).mean(axis=(2, 3))
+                worth = worth - settings.trust * strays
             found = worth.argmax(axis=1)
             better = worth[each, found] > most
             best = np.where(better[:, None, None], plans[each, found], best)
@@ -199,11 +182,6 @@ class MpcController:
         plans[..., 1] += change[..., 1] + stance * change[..., 2]
         return np.clip(plans, -1.0, 1.0)
 
-    def _distrust(self, plans: Vector, base: Vector) -> Vector:
-        if self._settings.trust == 0.0:
-            return np.zeros(plans.shape[:2])
-        return self._settings.trust * np.square(0.5 * (plans - base[:, None])).mean(axis=(2, 3))
-
     def _read(self, block: NDArray[np.int64], field: str) -> NDArray[Any]:
         assert self._simulation is not None
         return self._simulation.walkers[field][block]
@@ -215,6 +193,7 @@ def _one_step_on(plans: Vector) -> Vector:
 
 
 def _regulator(task: str, options: EnvOptions) -> Agent:
+    """The regulator; for a walker without a gait the controller that never acts."""
     try:
         return guided(task, options)
     except NoGaitError:

@@ -5,14 +5,12 @@ percentile bootstrap intervals, each task drawn for itself. What is drawn anew a
 times, the trainings too, so that an interval holds for another training on other episodes. All trainings walk the same episodes: rows and
 columns of one table are drawn, each once for the whole of it (Owen, 2007, "The pigeonhole bootstrap", Annals of Applied Statistics 1), which
 errs towards wide intervals. Every agent gets the same draws of episodes, so that differences are those of pairs.
-
-Their library, rliable, draws along one axis only and, in version 1.2.0, from numpy's global generator whatever seed it is given, and needs
-arch, pandas, seaborn and absl; the few lines here are numpy's.
+Their library, rliable, draws along one axis only.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -36,8 +34,10 @@ class Estimate(NamedTuple):
     high: float
 
 
-@dataclass(frozen=True)
-class Resampled:
+UNDEFINED = Estimate(math.nan, math.nan, math.nan)
+
+
+class Resampled(NamedTuple):
     """Mean and interquartile mean of values, and of as many resamples as ``RESAMPLES``: shape (RESAMPLES,) each."""
 
     mean: float
@@ -54,11 +54,8 @@ class Resampled:
     def less(self, other: Resampled) -> Resampled:
         """The differences to another agent's on the same episodes."""
         return Resampled(
-            self.mean - other.mean,
-            self.iqm - other.iqm,
-            self.means - other.means,
-            self.iqms - other.iqms,
-        )
+            self.mean - other.mean, self.iqm - other.iqm, self.means - other.means, self.iqms - other.iqms
+        )  # fmt: skip
 
 
 def resample(values: Vector, stream: int = 0) -> Resampled:
@@ -67,14 +64,9 @@ def resample(values: Vector, stream: int = 0) -> Resampled:
     Parameters
     ----------
     values : shape (trainings, episodes)
-        NaN where an episode leaves one undefined: those are left out.
+        NaN where an episode leaves one undefined: those are left out. The draws are seeded: the same values give the same.
     stream : int
         Trainings of two agents have nothing to do with one another: give them different numbers. Episodes are drawn alike for all.
-
-    Returns
-    -------
-    Resampled
-        The draws are seeded: the same values give the same.
     """
     trainings, episodes = values.shape
     if trainings * episodes == 0:
@@ -83,7 +75,7 @@ def resample(values: Vector, stream: int = 0) -> Resampled:
         )
     defined = values[np.isfinite(values)]
     if len(defined) == 0 or defined.min() == defined.max():  # resampling has nothing to draw
-        only = float(defined[0]) if len(defined) else float("nan")
+        only = float(defined[0]) if len(defined) else math.nan
         constant = np.full(RESAMPLES, only)
         return Resampled(only, only, constant, constant)
     mean, iqm = _statistics(values, np.ones((1, trainings)), np.ones((1, episodes)))
@@ -93,12 +85,8 @@ def resample(values: Vector, stream: int = 0) -> Resampled:
         _statistics(values, of_trainings[k : k + _BLOCK], of_episodes[k : k + _BLOCK])
         for k in range(0, RESAMPLES, _BLOCK)
     ]
-    return Resampled(
-        float(mean[0]),
-        float(iqm[0]),
-        np.concatenate([block[0] for block in blocks]),
-        np.concatenate([block[1] for block in blocks]),
-    )
+    means, iqms = (np.concatenate(each) for each in zip(*blocks, strict=True))
+    return Resampled(float(mean[0]), float(iqm[0]), means, iqms)
 
 
 def share_estimate(happened: NDArray[np.bool_]) -> Estimate:
@@ -148,7 +136,7 @@ def _statistics(values: Vector, of_trainings: Vector, of_episodes: Vector) -> tu
 def _estimate(value: float, drawn: Vector) -> Estimate:
     found = drawn[np.isfinite(drawn)]
     if not np.isfinite(value) or len(found) == 0:
-        return Estimate(float("nan"), float("nan"), float("nan"))
+        return UNDEFINED
     tail = 0.5 * (1.0 - CONFIDENCE)
     low, high = np.quantile(found, (tail, 1.0 - tail))
     return Estimate(float(value), float(low), float(high))

@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 
 from rich import box
@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from .episodes import RETURN, Row, is_share
+from .intervals import Estimate
 
 _WIDTH = 5  # agents in a table: so many fit a terminal of 80 columns
 
@@ -30,8 +31,7 @@ def rows_to_plain(rows: Sequence[Row]) -> list[dict[str, str | int | float | Non
 
 
 def rows_to_json(rows: Sequence[Row]) -> str:
-    """A list of objects with the fields of ``Row``: task, agent, metric, mean, low, high, survival, episodes, iqm, ...; low and high are the
-    mean's."""
+    """A list of objects with the fields of ``Row``."""
     return json.dumps(rows_to_plain(rows), indent=2, allow_nan=False)
 
 
@@ -44,30 +44,16 @@ def rows_to_csv(rows: Sequence[Row]) -> str:
     return text.getvalue()
 
 
-def results_tables(rows: Sequence[Row]) -> list[Table]:
-    """Tables of each task, as ``results_table``, of a few agents each."""
-    tables: list[Table] = []
-    for task in dict.fromkeys(row.task for row in rows):
-        of_task = [row for row in rows if row.task == task]
-        agents = list(dict.fromkeys(row.agent for row in of_task))
-        for start in range(0, len(agents), _WIDTH):
-            shown = agents[start : start + _WIDTH]
-            tables.append(results_table([row for row in of_task if row.agent in shown]))
-    return tables
-
-
 def results_table(rows: Sequence[Row]) -> Table:
     """A table of one task: a metric to a row, an agent to a column, each interquartile mean, or share, over its 95 % interval.
 
     Of the return the mean stands beside it. Below: what each agent is against the best feedback controller, by its means.
     """
-    metrics = list(dict.fromkeys(row.metric for row in rows))
     agents = list(dict.fromkeys(row.agent for row in rows))
     cells = {(row.agent, row.metric): row for row in rows}
-    task = rows[0].task
     counts = sorted({row.episodes for row in rows}, reverse=True)
     table = Table(
-        title=f"{task}, {' or '.join(map(str, counts))} episodes: interquartile means, 95 % intervals",
+        title=f"{rows[0].task}, {' or '.join(map(str, counts))} episodes: interquartile means, 95 % intervals",
         box=box.SIMPLE_HEAD,
         padding=(0, 0),
         pad_edge=False,
@@ -75,39 +61,46 @@ def results_table(rows: Sequence[Row]) -> Table:
     table.add_column("metric", width=16)  # five agents and it fit a terminal of 80 columns
     for agent in agents:
         table.add_column(agent, justify="right", no_wrap=True)
-    for metric in metrics:
+    for metric in dict.fromkeys(row.metric for row in rows):
         found = [cells.get((agent, metric)) for agent in agents]
-        whole = is_share(task, metric)
-        table.add_row(
-            metric.replace("_", " "),
-            *("" if row is None else cell(row, mean=whole) for row in found),
-        )
+        table.add_row(metric.replace("_", " "), *(_over_interval(row, typical) for row in found))
         if metric == RETURN:
-            means = ("" if row is None else cell(row, mean=True) for row in found)
-            table.add_row("return, mean", *means)
+            table.add_row("return, mean", *(_over_interval(row, mean) for row in found))
     compared = [row for row in rows if row.against is not None]
     if compared:
         table.add_section()
     for metric in dict.fromkeys(row.metric for row in compared):
         found = [cells.get((agent, metric)) for agent in agents]
-        table.add_row(
-            f"{metric.replace('_', ' ')}\nagainst {compared[0].against}",
-            *((row.verdict or "") if row is not None else "" for row in found),
-        )
+        verdicts = (row.verdict or "" if row is not None else "" for row in found)
+        table.add_row(f"{metric.replace('_', ' ')}\nagainst {compared[0].against}", *verdicts)
     return table
 
 
-def cell(row: Row, *, mean: bool) -> str:
-    """The mean, or the interquartile mean, over its interval."""
-    value, low, high = estimate(row, mean=mean)
-    if math.isnan(value):
-        return "undefined"
-    return f"{number(value)}\n{number(low)}–{number(high)}"
+def mean(row: Row) -> Estimate:
+    """A row's mean with its interval."""
+    return Estimate(row.mean, row.low, row.high)
 
 
-def estimate(row: Row, *, mean: bool) -> tuple[float, float, float]:
-    """The mean, or the interquartile mean, with its interval."""
-    return (row.mean, row.low, row.high) if mean else (row.iqm, row.iqm_low, row.iqm_high)
+def typical(row: Row) -> Estimate:
+    """A row's interquartile mean with its interval; of a share the share."""
+    if is_share(row.task, row.metric):
+        return mean(row)
+    return Estimate(row.iqm, row.iqm_low, row.iqm_high)
+
+
+def _over_interval(row: Row | None, of: Callable[[Row], Estimate]) -> str:
+    if row is None:
+        return ""
+    value, low, high = of(row)
+    return "undefined" if math.isnan(value) else f"{number(value)}\n{number(low)}–{number(high)}"
+
+
+def bracketed(found: Estimate, *, signed: bool = False) -> str:
+    """A value with its interval in brackets; nothing if it is undefined."""
+    if math.isnan(found.value):
+        return ""
+    plus = "+" if signed and found.value > 0.0 else ""
+    return f"{plus}{number(found.value)} [{number(found.low)}, {number(found.high)}]"
 
 
 def number(value: float) -> str:
@@ -115,10 +108,22 @@ def number(value: float) -> str:
     return f"{value:.1f}" if abs(value) >= 10.0 else f"{value:.3f}"
 
 
+def markdown_table(
+    titles: Sequence[str], lines: Sequence[Sequence[str]], *, align_right: bool = False
+) -> str:
+    """A table in Markdown, all columns but the first aligned to the right if asked for."""
+    rule = ["---", *(["---:" if align_right else "---"] * (len(titles) - 1))]
+    return "\n".join("| " + " | ".join(line) + " |" for line in (titles, rule, *lines))
+
+
 def show(rows: Sequence[Row], console: Console, *, as_json: bool = False) -> None:
-    """Print rows, as tables or as JSON."""
+    """Print rows, as JSON or as tables of each task with a few agents each."""
     if as_json:
         console.print(rows_to_json(rows), soft_wrap=True, highlight=False, markup=False)
         return
-    for table in results_tables(rows):
-        console.print(table)
+    for task in dict.fromkeys(row.task for row in rows):
+        of_task = [row for row in rows if row.task == task]
+        agents = list(dict.fromkeys(row.agent for row in of_task))
+        for start in range(0, len(agents), _WIDTH):
+            shown = agents[start : start + _WIDTH]
+            console.print(results_table([row for row in of_task if row.agent in shown]))

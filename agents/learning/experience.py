@@ -18,19 +18,12 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from lean_yaw_env.envs.hindsight import HindsightReplay
 
-from .recorder import Arrays
+from .recorder import Arrays, State, flattened
 
 
 def mean_discount(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean of exp(-t / time constant) over steps of durations ``ratio`` times the time constant; 1 at its limit of no duration."""
     return np.where(ratio > 0.0, -np.expm1(-ratio) / np.where(ratio > 0.0, ratio, 1.0), 1.0)
-
-
-def named_arrays(name: str, value: Any) -> Arrays:
-    """An array, or each array of a dictionary, under a name of its own; views."""
-    if isinstance(value, dict):
-        return {f"{name}.{key}": each for key, each in value.items()}
-    return {name: np.asarray(value)}
 
 
 class TimeDiscountedBuffer(RolloutBuffer):
@@ -107,24 +100,21 @@ class TimeDiscountedReplay(ReplayBuffer):
         super().add(obs, next_obs, action, reward, done, infos)  # pyright: ignore[reportAttributeAccessIssue]
 
     def captured(self) -> Arrays:
-        """The experience there is, and where the next goes."""
+        """The experience there is, and where the next goes; views."""
         filled = self.buffer_size if self.full else self.pos
         arrays = {name: column[:filled] for name, column in self._columns().items()}
         return arrays | {"position": np.array([self.pos, filled])}
 
-    def restore(self, arrays: Arrays) -> None:
-        """Bring the buffer to what ``captured`` gave, or raise ``KeyError`` or ``ValueError`` if it is another buffer's."""
+    def restore(self, state: State) -> None:
+        """Bring the buffer to what ``captured`` returned, or raise ``KeyError`` or ``ValueError`` if it is another buffer's."""
+        arrays = flattened(state)
         self.pos, filled = (int(value) for value in arrays["position"])
         self.full = filled == self.buffer_size
         for name, column in self._columns().items():
             column[:filled] = arrays[name]
 
     def _columns(self) -> Arrays:
-        """All of the experience by name, one column for each key of a dictionary."""
-        columns: Arrays = {}
-        for name in self.columns:
-            columns |= named_arrays(name, getattr(self, name))
-        return columns
+        return flattened({name: getattr(self, name) for name in self.columns})
 
     def _get_samples(
         self, batch_inds: NDArray[np.int64], env: VecNormalize | None = None
@@ -151,13 +141,13 @@ class TimeDiscountedHindsight(TimeDiscountedReplay, HindsightReplay):
     columns: ClassVar[tuple[str, ...]] = (*TimeDiscountedReplay.columns, "ep_start", "ep_length")
 
     def captured(self) -> Arrays:
-        """The experience there is, where the next goes, and where the episodes under way began."""
-        return super().captured() | {"under_way": self._current_ep_start.copy()}
+        """With the starts of the episodes under way."""
+        return super().captured() | {"under_way": self._current_ep_start}
 
-    def restore(self, arrays: Arrays) -> None:
-        """Bring the buffer to what ``captured`` gave; see ``TimeDiscountedReplay``."""
-        super().restore(arrays)
-        self._current_ep_start[:] = arrays["under_way"]
+    def restore(self, state: State) -> None:
+        """With the starts of the episodes under way."""
+        super().restore(state)
+        self._current_ep_start[:] = state["under_way"]
 
     def _get_real_samples(
         self, batch_indices: Any, env_indices: Any, env: VecNormalize | None = None

@@ -19,9 +19,9 @@ from lean_yaw_env.analysis.limit_cycle import (
     find_gait,
     find_limit_cycle,
     find_passive_gaits,
+    find_periodic_gait,
 )
 from lean_yaw_env.analysis.passive_map import PassiveMap
-from lean_yaw_env.analysis.periodic import find_periodic_gait
 from lean_yaw_env.analysis.section_map import BODY_PARAMETERS, SectionMap, section_map_of
 from lean_yaw_env.analysis.storage import load_dataset, save_dataset
 

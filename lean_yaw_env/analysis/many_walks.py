@@ -64,14 +64,7 @@ class ManyWalks:
 
 
 def walk_many(section_map: SectionMap, states: Vector, n_steps: int) -> ManyWalks:
-    """Walk ``n_steps`` from each state, left foot first.
-
-    Parameters
-    ----------
-    section_map : SectionMap
-        How many steps it takes itself plays no part.
-    states : shape (n, k)
-    n_steps : int >= 1
+    """Walk ``n_steps`` from each of states (n, k), left foot first; how many steps the map itself takes plays no part.
 
     Raises
     ------
@@ -82,29 +75,17 @@ def walk_many(section_map: SectionMap, states: Vector, n_steps: int) -> ManyWalk
     current = np.array(states, dtype=float)
     steps, endings = np.zeros(len(current), dtype=np.int64), np.zeros(len(current))
     for first in range(0, len(current), _CHUNK):
-        part = slice(first, first + _CHUNK)
-        _walk(section_map, current[part], steps[part], endings[part], n_steps)
+        walking = np.arange(first, min(first + _CHUNK, len(current)))
+        carried = np.full(walking.size, section_map.carried)
+        for k in range(n_steps):
+            if not walking.size:
+                break
+            after, carried, status = section_map.step_many(current[walking], carried, k % 2)
+            done = status == records.STEPPED
+            # the integrator's failure leaves nothing that means anything
+            known = status != records.FAILED
+            current[walking[known]] = after[known]
+            steps[walking[done]] += 1
+            endings[walking[~done]] = status[~done]
+            walking, carried = walking[done], carried[done]
     return ManyWalks(steps, endings, current)
-
-
-def _walk(
-    section_map: SectionMap,
-    states: Vector,
-    steps: NDArray[np.int64],
-    endings: Vector,
-    n_steps: int,
-) -> None:
-    """Walk from states, which are overwritten by the last ones."""
-    walking = np.arange(len(states))
-    carried = np.full(len(states), section_map.carried)
-    for k in range(n_steps):
-        if not walking.size:
-            break
-        after, handed_on, status = section_map.step_many(states[walking], carried, k % 2)
-        done = status == records.STEPPED
-        # the integrator's failure leaves nothing that means anything
-        known = status != records.FAILED
-        states[walking[known]] = after[known]
-        steps[walking[done]] += 1
-        endings[walking[~done]] = status[~done]
-        walking, carried = walking[done], handed_on[done]

@@ -65,7 +65,8 @@ def gait_figure(cycle: LimitCycle) -> Figure:
             axes.axvline(began, color=_FAINT, linewidth=0.6, linestyle=":")
     angles.legend(frameon=False)
     angles.set(xlabel="time", ylabel="angle (rad)", title="angles, from heel strike to heel strike")
-    force.set(xlabel="time", ylabel="normal force (weights)", title="contact", ylim=(0.0, None))
+    force.set(xlabel="time", ylabel="normal force (weights)", title="contact")
+    force.set_ylim(0.0, 1.1 * force.get_ylim()[1])
     _draw_multipliers(plane, cycle)
     kind = "stable" if cycle.is_stable else "unstable"
     figure.suptitle(f"{kind} gait: speed {cycle.speed:.4g}, step length {cycle.step_length:.4g}")

@@ -1,4 +1,4 @@
-"""Plots of a leaderboard: each task's headline with intervals, and survival against push level."""
+"""Pictures of evaluations: each task's headline with intervals, survival against push level, and agents' footprints on the same episode."""
 
 from __future__ import annotations
 
@@ -6,16 +6,28 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
+from matplotlib.ticker import MaxNLocator
 
+from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.rendering.figures import new_figure, save_figure
+from lean_yaw_env.rendering.palette import COMMAND, GOAL, REFERENCE, unit_colour
+from lean_yaw_env.rendering.picture import footprint_figure
 
+from ..agent import Agent
 from ..registry import agent_colour
-from .comparison import direction
-from .episodes import Row, is_share
-from .row_tables import estimate
+from .episodes import Row, direction, is_share
+from .recording import RecordedEpisode, record_episode
+from .row_tables import typical
+
+PICTURED_STEPS = 120
+"""Steps of an episode that are drawn: two or three commands, at a scale at which footprints can be told apart."""
+_DPI = 110  # as sharp as a page shows it, and a small file
+_ARROW = 4.0  # leg lengths, of a commanded heading
 
 _COLUMNS = 4
 _INK = "0.2"
@@ -37,36 +49,28 @@ def save_leaderboard_plot(rows: Sequence[Row], path: Path) -> None:
         _draw_headline(axes, found, task, headline)
     for axes in places[len(tasks) :]:
         axes.set_axis_off()
+    keys = (
+        ("o", "interquartile mean or share, 95 % interval", _INK),
+        ("o", "mean", "none"),
+        ("|", "lowest and highest mean of a training", _INK),
+    )
     handles = [
-        _key("o", "interquartile mean or share, 95 % interval"),
-        _key("o", "mean", "none"),
-        _key("|", "lowest and highest mean of a training"),
+        Line2D([], [], color=_INK, markerfacecolor=fill, marker=marker, linestyle="", label=label)
+        for marker, label, fill in keys
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize="small", frameon=False)  # fmt: skip
     save_figure(figure, path)
-
-
-def _key(marker: str, label: str, fill: str = _INK) -> Line2D:
-    return Line2D([], [], color=_INK, markerfacecolor=fill, marker=marker, linestyle="", label=label)  # fmt: skip
 
 
 def _draw_headline(axes: Axes, rows: Sequence[Row], task: str, headline: str) -> None:
     share = is_share(task, headline)
     for place, row in enumerate(rows):
         colour = agent_colour(row.agent)
-        value, low, high = estimate(row, mean=share)
+        value, low, high = typical(row)
         axes.plot([low, high], [place, place], color=colour, linewidth=3.0, alpha=0.6, solid_capstyle="butt")  # fmt: skip
         axes.plot(value, place, "o", color=colour, markersize=5, clip_on=False)
         if not share:
-            axes.plot(
-                row.mean,
-                place,
-                "o",
-                markerfacecolor="none",
-                color=colour,
-                markersize=8,
-                clip_on=False,
-            )
+            axes.plot(row.mean, place, "o", markerfacecolor="none", color=colour, markersize=8, clip_on=False)  # fmt: skip
         if row.trainings > 1:
             ends = [row.least_training, row.greatest_training]
             axes.plot(ends, [place, place], "|", color=colour, markersize=9)
@@ -108,3 +112,48 @@ def save_push_levels_plot(levels: Mapping[float, Sequence[Row]], path: Path) -> 
     axes.set_axisbelow(True)
     figure.legend(loc="outside right center", fontsize="small", frameon=False)
     save_figure(figure, path)
+
+
+def save_agents_footprints(
+    agents: Mapping[str, Agent],
+    task: str,
+    path: Path,
+    *,
+    seed: int,
+    options: EnvOptions | None = None,
+) -> None:
+    """Draw the first steps of one episode, of an environment's seed, for each agent, all to one scale.
+
+    Arrows show commanded headings where they were given, circles goals (full: reached), a broad line the path to be followed.
+    """
+    episodes: dict[str, RecordedEpisode] = {}
+    for name, agent in agents.items():
+        episode = record_episode(agent, task, seed=seed, options=options, most_steps=PICTURED_STEPS)
+        ending = " (ended early)" if episode.terminated else ""
+        episodes[name + (" (fell)" if episode.fall else ending)] = episode
+    goals = [(goal.downhill, goal.right) for each in episodes.values() for goal in each.scene.goals]
+    # the same episode has the same body, whoever acts
+    radius = next(iter(episodes.values())).scene.parameters.foot_radius
+    figure, panels = footprint_figure(episodes, foot_radius=radius, places=goals)
+    for panel, episode in zip(panels, episodes.values(), strict=True):
+        _draw_task(panel, episode)
+        panel.xaxis.set_major_locator(MaxNLocator(5, integer=True))
+        panel.yaxis.set_major_locator(MaxNLocator(8, integer=True))
+    save_figure(figure, path, dpi=_DPI)
+
+
+def _draw_task(axes: Axes, episode: RecordedEpisode) -> None:
+    """Commanded headings, the path to be followed and goals."""
+    arrow = {"arrowstyle": "-|>", "color": unit_colour(COMMAND), "linewidth": 1.5}
+    for step, heading in episode.commands:
+        downhill, right = episode.footprints[step]  # a positive heading is to the left
+        tip = (right - _ARROW * np.sin(heading), downhill + _ARROW * np.cos(heading))
+        axes.annotate("", xy=tip, xytext=(right, downhill), arrowprops=arrow)
+    if episode.scene.reference_path is not None:
+        downhill, right = episode.scene.reference_path.T
+        axes.plot(right, downhill, color=unit_colour(REFERENCE), linewidth=3.0, alpha=0.45, zorder=0.5)  # fmt: skip
+    colour = unit_colour(GOAL)
+    for goal in episode.scene.goals:
+        inside = colour if goal.reached else "none"
+        place = (goal.right, goal.downhill)
+        axes.add_patch(Circle(place, goal.radius, facecolor=inside, edgecolor=colour, linewidth=1.5))  # fmt: skip
