@@ -64,8 +64,13 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write a value as JSON that every reader of JSON takes; infinite numbers become the strings "inf" and "-inf"."""
-    write_text(path, json.dumps(_plain(value), indent=2, allow_nan=False) + "\n")
+    """Write a value as ``json_text`` has it."""
+    write_text(path, json_text(value))
+
+
+def json_text(value: Any) -> str:
+    """A value as JSON that every reader of JSON takes; infinite numbers become the strings "inf" and "-inf"."""
+    return json.dumps(_plain(value), indent=2, allow_nan=False) + "\n"
 
 
 def read_json(path: Path) -> Any:

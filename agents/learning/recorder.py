@@ -38,7 +38,7 @@ class CheckpointError(ValueError):
 
 
 class EndedEpisode(NamedTuple):
-    """An ended episode: environment steps of the training at its end, return, number of steps, and whether only the time limit ended it."""
+    """An ended episode: environment steps of the training at its end, return, number of steps, and whether the time limit or a success ended it."""
 
     steps: int
     value: float

@@ -50,7 +50,8 @@ class _Callback(BaseCallback):
         self._buffer.durations[self._buffer.pos] = walkers.step_durations()
         for i in np.flatnonzero(self.locals["dones"]):
             info = self.locals["infos"][i]
-            episode, survived = info["episode"], info["TimeLimit.truncated"]
+            episode = info["episode"]
+            survived = info["TimeLimit.truncated"] or bool(info.get("is_success", False))
             self._recorder.add(
                 EndedEpisode(self.num_timesteps, episode["r"], episode["l"], survived)
             )
