@@ -98,7 +98,7 @@ class PassiveMap(SectionMap):
             steps.append(CycleStep(
                 start=state, state=result.state, foot=foot, command=_NO_COMMAND, duration=result.duration, displacement=result.displacement,
                 least_normal_force=result.least_normal_force, greatest_friction=result.greatest_friction,
-                gravity_work=result.gravity_work, shift_work=0.0,
+                gravity_work=result.energy.gravity_work, shift_work=0.0,
             ))  # fmt: skip
             state, angle = result.state, result.inter_leg_angle
         return steps
