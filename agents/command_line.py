@@ -125,12 +125,14 @@ def tune(
     agent: Annotated[str, Argument(help="feedback, lqr, mpc, ppo or sac.")],
     task: Annotated[str, Argument(help="The task's name.")],
     trials: Annotated[int, Option(help="Total number of trials, including those in the study already.")] = 100,
-    episodes: Annotated[int | None, Option(help="Episodes that settings are scored on; 128 for feedback and lqr, 24 for mpc, 512 for learners otherwise.")] = None,
+    episodes: Annotated[int | None, Option(help="Episodes that settings are scored on; 128 for feedback and lqr, 24 for mpc, 512 for learners "
+        "otherwise.")] = None,
     horizon: Annotated[float | None, Option(help="Length of these episodes, of controllers; the task's otherwise.")] = None,
     steps: Annotated[int | None, Option(help="Steps of each training, of learners; the task's own number otherwise.")] = None,
     repeats: Annotated[int, Option(help="Trainings of a trial, of learners, each of another seed.")] = 1,
     storage: Annotated[Path | None, Option(help="SQLite file that the study is kept in and gone on with; runs/tuning/AGENT-TASK.db otherwise.")] = None,
-    out: Annotated[Path | None, Option(help="JSON file for the best settings so far; beside the study's file otherwise. The package's own settings stay as they are: see ship.")] = None,
+    out: Annotated[Path | None, Option(help="JSON file for the best settings so far; beside the study's file otherwise. The package's own settings "
+        "stay as they are: see ship.")] = None,
 ) -> None:  # fmt: skip
     """Search for settings of a controller or a learner, beginning with those that come with the package, and print the best.
 
@@ -159,7 +161,8 @@ def tune(
 @app.command()
 @reported("ship")
 def ship(
-    sources: Annotated[list[Path], Argument(metavar="SOURCE...", help="Folders of finished runs or series of them, or files of best settings that tune left.")],
+    sources: Annotated[list[Path], Argument(metavar="SOURCE...", help="Folders of finished runs or series of them, or files of best settings "
+        "that tune left.")],
     replace: Annotated[bool, Option("--replace", help="Replace what is there already.")] = False,
 ) -> None:  # fmt: skip
     """Put trained policies and tuned settings among those that come with the package."""

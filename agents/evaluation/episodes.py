@@ -26,7 +26,7 @@ class Episodes:
     """What came of an agent's episodes, in arrays of shape (episodes,)."""
 
     survived: NDArray[np.bool_]
-    """Whether the time limit and nothing else ended it."""
+    """Whether the time limit or a success ended it."""
     metrics: dict[str, Vector]
     """``return``, the task's metrics and ``speed`` (distance over time) by name; NaN where an episode leaves one undefined."""
 
@@ -96,7 +96,7 @@ class Row:
     Attributes
     ----------
     mean, low, high : the mean, for a metric that is 0 or 1 the share, with its 95 % interval
-    survival : share of the episodes that nothing but the time limit ended
+    survival : share of the episodes that the time limit or a success ended
     episodes : of each training
     iqm, iqm_low, iqm_high : the interquartile mean with its 95 % interval; NaN for a share
     trainings : policies of as many trainings are pooled; 1 for what is not trained

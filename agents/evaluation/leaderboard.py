@@ -33,7 +33,7 @@ All agents walk the same test episodes. No training, no tuning and no choice has
 agent was trained several times, its trainings (those of the package) are pooled.
 
 - The first number of each agent is the **mean** of the task's main metric, which counts every fall. Beside it stands **survival**, the share of
-  episodes that only the time limit ended, and the **iqm**, the interquartile mean: the mean of the middle half of all episodes, which does not show
+  episodes that the time limit or a success ended, and the **iqm**, the interquartile mean: the mean of the middle half of all episodes, which does not show
   what happens in fewer than a quarter of them. Errors are averaged over the time before a fall; the error of an agent that often falls means little.
 - Brackets contain {confidence:.0%} confidence intervals: bootstrap intervals ({resamples:,} resamples, {claim_resamples:,} of main metrics) for means,
   Wilson intervals for shares. The bootstrap resamples the episodes and, if there are several, the trainings. Such an interval is valid for another
