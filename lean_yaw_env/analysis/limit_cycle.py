@@ -202,7 +202,7 @@ def find_limit_cycle(walker: WalkerOrMap, **command: Unpack[CommandArguments]) -
 def find_gait(walker: Walker, **command: Unpack[CommandArguments]) -> Vector:
     """The section state of ``find_limit_cycle`` alone, on the left foot, to the same residual.
 
-    The root finder estimates its own slopes here, so that nothing but the step itself is compiled.
+    The root finder estimates its own slopes here, so that nothing but the step itself is compiled; where that fails, it gets the Jacobian.
 
     Raises
     ------
@@ -212,7 +212,10 @@ def find_gait(walker: Walker, **command: Unpack[CommandArguments]) -> Vector:
     section_map = section_map_of(walker, **command)
     if not isinstance(section_map, ActiveMap):
         raise ValueError(f"walker must be a Walker, got {walker!r}")
-    return search_active(section_map, exact=False)
+    try:
+        return search_active(section_map, exact=False)
+    except NoGaitError:
+        return search_active(section_map, exact=True)
 
 
 def find_passive_gaits(walker: PassiveWalker) -> tuple[LimitCycle, ...]:
