@@ -470,7 +470,9 @@ def test_gymnasium_records_a_video_of_many_walkers(tmp_path: Path) -> None:
 
 
 def test_too_many_walkers_to_draw_are_refused() -> None:
-    with pytest.raises(ValueError, match="draws at most 64 walkers, got num_envs=65"):
+    with pytest.raises(
+        ValueError, match="num_envs with a render_mode must be from 1 to 64, got 65"
+    ):
         WalkerVectorEnv(65, render_mode="rgb_array")
     env = WalkerVectorEnv(2)
     env.reset(seed=0)

@@ -12,8 +12,7 @@ from torch import Tensor
 from torch.autograd import Function
 from torch.autograd.function import once_differentiable
 
-from lean_yaw_env.envs.derivatives import FOLLOWED
-from lean_yaw_env.envs.linearised import LinearisedSteps
+from lean_yaw_env.envs.derivatives import FOLLOWED, LinearisedSteps
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.sb3 import WalkerVecEnv
 from lean_yaw_env.registration import TASK_VERSIONS
@@ -139,7 +138,7 @@ class DifferentiableWalkers:
     def _outputs(self) -> NDArray[np.float64]:
         """The numbers of the step just made, as the Jacobians' rows name them; a fall takes no time here."""
         simulation = self._simulation
-        durations = np.where(simulation.terminated, 0.0, simulation.walkers["duration"])
+        durations = np.where(simulation.ends[0], 0.0, simulation.walkers["duration"])
         observations = simulation.observations.astype(np.float64)
         return np.column_stack(
             [self._linearised.values(), observations, simulation.rewards, durations]

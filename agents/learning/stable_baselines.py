@@ -185,7 +185,7 @@ class StableBaselinesLearner:
         np.random.set_state({"bit_generator": "MT19937", **state["numpy"]})  # noqa: NPY002
 
     def _moments(self) -> dict[str, Any]:
-        found = {"returns": self._normaliser.ret_rms}
+        found: dict[str, Any] = {"returns": self._normaliser.ret_rms}
         if self._normaliser.norm_obs:
             found["observations"] = self._normaliser.obs_rms
         return found

@@ -1,7 +1,8 @@
-"""Waypoint: walk to one place after another, on a slope that turns with the walker."""
+"""Waypoint and WaypointGoal: walk to one place after another, or to one and be paid for reaching it alone, on a slope that turns with the walker."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi
 from typing import Any
 
@@ -87,7 +88,7 @@ def features(walker: Any, task: Any) -> Any:
     return goal_bearing(walker, task), goal_distance(walker, task)
 
 
-TASK = Task(
+WAYPOINT = Task(
     name="Waypoint",
     fields=(
         Field("goal_x", "leg lengths", "downhill"),
@@ -119,7 +120,6 @@ TASK = Task(
     "held, 0.05, the walker turns on a radius of 8.2 at the inter-leg angle of 0.3, of 38 at 0.15, 4.1 at 0.36 and 2.3 at 0.39; at 0.42 it "
     "trips.",
     reward_text=f"{WALKING_RATE} + {APPROACH:g} (speed of approach to the goal) - {EFFORT_RATE} effort",
-    history=("0: the first.",),
     commands={
         "goal": Command(
             ("goal_x", "goal_z"), -FARTHEST_COMMAND, FARTHEST_COMMAND, "place of the first goal"
@@ -130,4 +130,49 @@ TASK = Task(
     parameters=WalkerParameters(slope_turns=True),
     horizon=300.0,
     headline="goals",
+)
+
+
+@formula
+def goal_reward(walker: Any, task: Any) -> Any:
+    return 1.0 if goal_distance(walker, task).real <= RADIUS else 0.0
+
+
+@formula
+def goal_update(walker: Any, task: Any) -> bool:
+    if goal_distance(walker, task) <= RADIUS:
+        task.reached = 1
+    return task.reached != 0
+
+
+@formula
+def goal_refresh(walker: Any, task: Any) -> None:
+    heading = mean_heading(walker)
+    task.own_x, task.own_z = place(walker)
+    task.heading_cosine, task.heading_sine = np.cos(heading), np.sin(heading)
+
+
+WAYPOINT_GOAL = replace(
+    WAYPOINT,
+    name="WaypointGoal",
+    fields=(
+        *WAYPOINT.fields[:2],
+        Field("own_x", "leg lengths", "where the walker is, downhill"),
+        Field("own_z", "leg lengths", "the same to the right", is_odd=True),
+        Field("heading_cosine", "", "of the mean heading of the last two footprints"),
+        Field("heading_sine", "", "of the same", is_odd=True),
+        Field("reached", "", "whether the goal is reached", "i8"),
+    ),
+    reward=goal_reward,
+    update=goal_update,
+    refresh=goal_refresh,
+    metrics={
+        "is_success": Metric("reached", None, "1 once the goal is reached", "higher", True),
+        "time": Metric("time", None, "when the episode ended"),
+    },
+    summary="Walk to one place, as far and at any bearing as in Waypoint.",
+    reward_text=f"none, but 1 for the step that comes within {RADIUS} of the goal",
+    ends="the goal reached",
+    horizon=150.0,  # enough for a half circle and the farthest goal, at the gait's speed, twice over
+    headline="is_success",
 )
