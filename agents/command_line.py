@@ -220,6 +220,54 @@ def closed_loop(
         typer.echo(f"written: {page}", err=True)
 
 
+@app.command("capture")
+def capture_command(
+    task: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="The task's name, several separated by commas, or all. Push by default.",
+            show_default=False,
+        ),
+    ] = None,
+    agents: Annotated[
+        str,
+        typer.Option(
+            help="Agents, separated by commas; those that plan, remember or draw are left out."
+        ),
+    ] = "fixed,feedback,lqr,ppo",
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for capture.csv and images/capture_*.png.")
+    ] = None,
+    agent_path: AgentPath = None,
+    runs: Runs = Path("runs"),
+    starts: Annotated[int, typer.Option(help="In the box of starts.")] = 1024,
+    points: Annotated[int, typer.Option(help="To a side of the picture's plane.")] = 61,
+    friction_limit: Annotated[
+        float,
+        typer.Option(help="Largest ratio of tangential to normal force; inf is the tasks' own."),
+    ] = float("inf"),
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+) -> None:
+    """Hold agents against what can be saved: an exhaustive search over two chosen steps, each followed by the paper's controller."""
+    from .evaluation.capture import capture_table, examine_captures, write_captures
+
+    try:
+        reports, notes = examine_captures(
+            tasks_in(task or ["Push"]), names_in([agents]), path=agent_path, runs=runs,
+            starts=starts, points=points, friction_limit=friction_limit,
+        )  # fmt: skip
+    except (ValueError, LeanYawError) as error:
+        raise typer.BadParameter(str(error)) from error
+    if as_json:
+        typer.echo(dumps([row for each in reports for row in each.rows()], indent=2))
+    else:
+        Console().print(capture_table(reports))
+        for what, why in notes.items():
+            typer.echo(f"left out: {what}: {why}", err=True)
+    for path in write_captures(reports, out) if out is not None and reports else ():
+        typer.echo(f"written: {path}", err=True)
+
+
 @app.command()
 def film(
     task: Annotated[str, typer.Option(help="A task's name, or all.")] = ALL,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -208,12 +209,12 @@ def test_a_solvers_failure_is_raised_and_no_fall(monkeypatch) -> None:
         ({"most_steps": 5}, "most_steps must be from 0 to 4"),
         ({"settle_steps": 0}, "settle_steps must be"),
         ({"states": STATES[:, :4]}, "states must have shape"),
-        ({"known": Capture(np.zeros(2), np.zeros((2, 2, 2)))}, "known must be of the same states"),
+        ({"known": Capture(np.zeros(2, dtype=int), np.zeros((2, 2, 2)))}, "known must be of the same states"),
     ],
 )
-def test_bad_arguments_are_refused_by_name(change, message: str) -> None:
+def test_bad_arguments_are_refused_by_name(change: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        capture(WALKER, **{"states": STATES, **change})
+        capture(WALKER, **{"states": STATES, **change})  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize(
@@ -226,7 +227,7 @@ def test_bad_arguments_are_refused_by_name(change, message: str) -> None:
         ({"largest_change": -1.0}, "largest_change must be in"),
     ],
 )
-def test_bad_choices_are_refused_by_name(arguments, message: str) -> None:
+def test_bad_choices_are_refused_by_name(arguments: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Choices(**arguments)
 
