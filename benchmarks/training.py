@@ -18,8 +18,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from agents.learning.algorithms import settings_for
 from agents.learning.ppo import PPOSettings
 from benchmarks.environments import HEADING, kernel_alone
-from benchmarks.measure import SMALLEST, Effort, measure
-from benchmarks.measurements import Measurement, command_line
+from benchmarks.measure import SMALLEST, Effort, Measurement, command_line, measure
 from lean_yaw_env.envs.sb3 import WalkerVecEnv
 
 ROLLOUTS = 5

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Choice = TypeVar("Choice", bound=str)
+Instance = TypeVar("Instance")
 
 _NUMBERS = (int, float, np.integer, np.floating)
 
@@ -48,6 +49,13 @@ def require_flag(name: str, value: Any) -> bool:
     if not isinstance(value, (bool, np.bool_)):
         raise ValueError(f"{name} must be True or False, got {value!r}")
     return bool(value)
+
+
+def require_instance(name: str, value: Any, kind: type[Instance]) -> Instance:
+    """Return an object of a class."""
+    if not isinstance(value, kind):
+        raise ValueError(f"{name} must be {kind.__name__}, got {value!r}")
+    return value
 
 
 def require_choice(name: str, value: Any, choices: Collection[Choice]) -> Choice:
@@ -104,8 +112,8 @@ def require_shape(
         raise ValueError(_must_hold_numbers(name, value, shape)) from error
     if given.dtype.kind not in "iuf":
         raise ValueError(_must_hold_numbers(name, value, shape))
-    fits = len(shape) == given.ndim and all(map(_fits, shape, given.shape))
-    if not fits:
+    fits = (wanted in (None, length) for wanted, length in zip(shape, given.shape, strict=False))
+    if len(shape) != given.ndim or not all(fits):
         raise ValueError(f"{name} must have shape {_written(shape)}, got {given.shape}")
     return np.asarray(given, dtype=np.float64, order="C")
 
@@ -118,10 +126,6 @@ def require_one_or_each(name: str, value: ArrayLike, n: int) -> NDArray[np.float
     if len(given) != n:
         raise ValueError(f"{name} must be one number or {n} of them, got {len(given)}")
     return given
-
-
-def _fits(wanted: int | None, length: int) -> bool:
-    return wanted is None or wanted == length
 
 
 def _must_hold_numbers(name: str, value: Any, shape: tuple[int | None, ...]) -> str:

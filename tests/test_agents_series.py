@@ -125,12 +125,12 @@ def test_a_series_goes_on_with_what_is_unfinished_and_gathers_its_seeds(tmp_path
         for row in json.loads((place / "evaluation.json").read_text())
         if (row["agent"], row["metric"]) == ("ppo", "return")
     ]
-    own = next(each for each in result.by_seed if each.metric == "return")
-    assert own.seeds == (0, 3)
-    assert list(own.means) == means
-    assert own.median == pytest.approx(np.mean(means))  # of two; rounding
+    assert result.seeds == (0, 3)
+    assert result.means["return"] == means
+    (median,) = (row[1] for row in result.rows() if row[0] == "return")
+    assert median == pytest.approx(np.mean(means))  # of two; rounding
     assert {"random", "fixed"} <= set(result.others["return"])
-    assert seeds_table(result).row_count == len(result.by_seed)
+    assert seeds_table(result).row_count == len(result.means)
     with (folder / "seeds.csv").open() as file:
         assert next(csv.reader(file)) == ["metric", "median", "lowest", "highest", "seed0", "seed3"]
     assert (folder / "learning_curves.png").stat().st_size > 0

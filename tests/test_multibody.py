@@ -23,10 +23,9 @@ from lean_yaw_env.multibody import (
     find_passive_gait,
     table3_c_eigenvalues,
 )
-from lean_yaw_env.multibody.dynamics import Offset, Stance, impact, place
+from lean_yaw_env.multibody.dynamics import Offset, Shift, Stance
 from lean_yaw_env.multibody.gait import Table3Column
 from lean_yaw_env.multibody.kinematics import kinematics
-from lean_yaw_env.multibody.shift import Shift
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.walker import Walker
 
@@ -274,24 +273,13 @@ def test_derivatives_by_sympy_agree_with_differences_of_what_they_derive() -> No
         "foot_radius": 0.5,
         "ankle_tilt": 0.55,
         "heading": 0.3,
-        "contact": np.array([0.2, -0.1]),
+        "contact": (0.2, -0.1),
     }
 
     def at(coordinates: Array) -> tuple[Array, Array]:
-        k = kinematics(
-            coordinates[:8],
-            v[:8],
-            mass_offset=float(coordinates[8]),
-            mass_offset_rate=float(v[8]),
-            **place_kwargs,
-        )
-        values = np.concatenate([k.positions, k.constraints, [k.pitch]])
-        jacobian = np.vstack([k.position_jacobian, k.constraint_jacobian, k.pitch_jacobian])
-        return values, jacobian
+        here = kinematics(coordinates, v, **place_kwargs)
+        return here.values, here.jacobian
 
-    here = kinematics(
-        q[:8], v[:8], mass_offset=float(q[8]), mass_offset_rate=float(v[8]), **place_kwargs
-    )
     h = 1e-5
     # Central differences: truncation h^2, round-off 1e-16 / h.
     for j in range(9):
@@ -300,58 +288,45 @@ def test_derivatives_by_sympy_agree_with_differences_of_what_they_derive() -> No
             (at(q + e)[0] - at(q - e)[0]) / (2 * h), at(q)[1][:, j], atol=1e-9
         )
     along = (at(q + h * v)[1] - at(q - h * v)[1]) / (2 * h) @ v
-    bias = np.concatenate([here.position_bias, here.constraint_bias, [here.pitch_bias]])
-    np.testing.assert_allclose(along, bias, atol=1e-9)
+    np.testing.assert_allclose(along, kinematics(q, v, **place_kwargs).bias, atol=1e-9)
 
 
 # Impact
 
 
-def impact_case() -> tuple[MultibodyWalker, Stance, Array, Array]:
-    body, stance = walker(foot_mass=1e-2), Stance(-1.0, 0.2)
-    coordinates = place(body, stance, 0.15, 0.02, -0.3)
-    return body, stance, coordinates, np.random.default_rng(3).uniform(-0.5, 0.5, 8)
-
-
-def mass_velocities(body: MultibodyWalker, stance: Stance, q: Array, v: Array) -> Any:
-    return kinematics(
-        q,
-        v,
-        side=stance.side,
-        hip_width=body.hip_width,
-        foot_radius=body.foot_radius,
-        ankle_tilt=body.ankle_tilt,
-        heading=stance.heading,
-        contact=np.array(stance.contact),
-    )
+def impact_case() -> tuple[Stance, Array]:
+    stance = Stance(walker(foot_mass=1e-2), -1.0, 0.2)
+    y = stance.placed((0.15, 0.02, 0.0, 0.0), -0.3, 0.0)
+    y[8:] = np.random.default_rng(3).uniform(-0.5, 0.5, 8)
+    return stance, y
 
 
 def test_impact_changes_momentum_by_the_new_contacts_impulse_only() -> None:
-    body, stance, q, before = impact_case()
-    after, impulses = impact(body, stance, q, before, Offset())
-    here = mass_velocities(body, stance, q, before)
-    change = body.masses * (here.position_jacobian[:, :8] @ (after - before))
+    stance, y = impact_case()
+    after, impulse = stance.impact(y, Offset())
+    here = stance.kinematics(y)
+    change = stance.body.masses * (here.jacobian[:12, :8] @ (after - y)[8:])
     ahead, across = floor_axes(stance.heading)
-    expected = impulses[2] * UP + impulses[3] * across + impulses[4] * ahead
+    expected = impulse.normal * UP + impulse.lateral * across + impulse.forward * ahead
     # Round-off of a 13 by 13 solve.
     np.testing.assert_allclose(change.reshape(4, 3).sum(axis=0), expected, atol=1e-12)
-    centre_to_contact = -body.foot_radius * 0.15 * ahead
-    arms = here.positions.reshape(4, 3) - centre_to_contact
+    centre_to_contact = -stance.body.foot_radius * 0.15 * ahead
+    arms = here.values[:12].reshape(4, 3) - centre_to_contact
     moment = np.cross(arms, change.reshape(4, 3)).sum(axis=0)
     # About the new contact's cylinder axis nothing acts: that component of angular momentum stays.
     assert abs(moment @ across) < 1e-12
-    assert moment @ UP == pytest.approx(impulses[0], abs=1e-12)
+    assert moment @ UP == pytest.approx(impulse.yaw_torque, abs=1e-12)
 
 
 def test_impact_leaves_the_new_foot_rolling_and_a_second_impact_does_nothing() -> None:
-    body, stance, q, before = impact_case()
-    after, _ = impact(body, stance, q, before, Offset())
-    here = mass_velocities(body, stance, q, after)
+    stance, y = impact_case()
+    after, _ = stance.impact(y, Offset())
     # Round-off of the solve.
-    np.testing.assert_allclose(here.constraint_jacobian[:, :8] @ after, 0.0, atol=1e-13)
-    again, impulses = impact(body, stance, q, after, Offset())
+    contact = stance.kinematics(after).jacobian[12:17, :8]
+    np.testing.assert_allclose(contact @ after[8:], 0.0, atol=1e-13)
+    again, impulse = stance.impact(after, Offset())
     np.testing.assert_allclose(again, after, atol=1e-12)
-    np.testing.assert_allclose(impulses, 0.0, atol=1e-12)
+    np.testing.assert_allclose(list(vars(impulse).values()), 0.0, atol=1e-12)
 
 
 def test_heel_strike_in_mid_shift_locks_the_masses_where_they_are() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,24 +19,15 @@ _LARGEST_PUSH = 10.0  # push level that there is
 _OFFSET = 1  # the action that says which way the masses go
 
 
-@dataclass
 class _Account:
-    """Running worth of plans, row by row."""
+    """Running worth of plans, row by row; of rewards and durations the last two steps'."""
 
-    worth: Vector
-    start: Vector
-    live: NDArray[np.bool_]
-    rewards: Vector
-    durations: Vector
-    """(2, rows): of the last two steps."""
-
-    @classmethod
-    def at(cls, times: Vector) -> _Account:
+    def __init__(self, times: Vector) -> None:
         n = len(times)
-        # the durations are divided by only once there is one
-        return cls(
-            np.zeros(n), times.copy(), np.ones(n, dtype=np.bool_), np.zeros((2, n)), np.full((2, n), 1e-9)
-        )  # fmt: skip
+        self.worth, self.start = np.zeros(n), times.copy()
+        self.live = np.ones(n, dtype=np.bool_)
+        self.rewards = np.zeros((2, n))
+        self.durations = np.full((2, n), 1e-9)  # divided by only once there is one
 
 
 class Rollouts:
@@ -47,15 +38,7 @@ class Rollouts:
     drawn. Without scenarios nobody pushes, and where the task draws something new, a command or a goal, a plan ends; with
     scenarios, numbers are drawn from keys of its own.
 
-    Parameters
-    ----------
-    simulation : Simulation
-        The environment's; read, never changed.
-    settings : MpcSettings
-    base : Agent
-        That remembers nothing; walks the tail.
-    seed : int >= 0
-        Of the scenarios.
+    The environment's simulation is read, never changed; ``base``, which remembers nothing, walks the tail; ``seed`` is that of the scenarios.
     """
 
     def __init__(
@@ -102,7 +85,7 @@ class Rollouts:
         draws = max(settings.scenarios, 1)
         copies = self._copied(block, m * draws, is_pushed=True)
         actions = np.repeat(plans.reshape(n * m, settings.horizon, ACTION_SIZE), draws, axis=0)
-        account = _Account.at(copies.walkers["time"])
+        account = _Account(copies.walkers["time"])
         last = settings.horizon + settings.tail - 1
         for step in range(last + 1):
             if step < settings.horizon:

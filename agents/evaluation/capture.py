@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
+from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
@@ -195,8 +196,9 @@ def write_captures(reports: Sequence[CaptureReport], out: Path) -> list[Path]:
     return paths
 
 
-def capture_table(reports: Sequence[CaptureReport]) -> Table:
-    """For a terminal: what can be saved, and how much of that each agent saves."""
+def show(reports: Sequence[CaptureReport], notes: dict[str, str]) -> None:
+    """Print what can be saved and how much of that each agent saves, and what is left out."""
+    console = Console()
     table = Table(title="share saved by the agent of the starts that N chosen steps can save")
     for heading in ("task", "agent", *(f"N = {n}" for n in range(MOST_STEPS + 1)), "beyond", "of all"):  # fmt: skip
         table.add_column(heading, justify="left" if heading in ("task", "agent") else "right")
@@ -205,7 +207,9 @@ def capture_table(reports: Sequence[CaptureReport]) -> Table:
         table.add_row(
             report.task, report.agent, *shares, f"{report.saved_beyond:.3f}", f"{report.is_saved.mean():.3f}"
         )  # fmt: skip
-    return table
+    console.print(table)
+    for what, why in notes.items():
+        console.print(f"left out: {what}: {why}", markup=False, highlight=False, soft_wrap=True)
 
 
 _KINDS = (

@@ -98,7 +98,7 @@ class PassiveMap(SectionMap):
             steps.append(CycleStep(
                 start=state, state=result.state, foot=foot, command=_NO_COMMAND, duration=result.duration, displacement=result.displacement,
                 least_normal_force=result.least_normal_force, greatest_friction=result.greatest_friction,
-                gravity_work=result.gravity_work, shift_work=0.0,
+                gravity_work=result.energy.gravity_work, shift_work=0.0,
             ))  # fmt: skip
             state, angle = result.state, result.inter_leg_angle
         return steps
@@ -143,7 +143,8 @@ class PassiveMap(SectionMap):
             raise NoGaitError(
                 f"no gait found for the passive walker of {self.walker.parameters}; tried: "
                 f"{_PITCHES.size * _RATES.size} planar starts, following each gait from no hip "
-                f"width; reasons: {'; '.join(sorted(reasons))}"
+                f"width; reasons: {'; '.join(sorted(reasons))}. Try a positive slope that is gentle (below 0.05), "
+                "hips narrower than 0.1, or an ankle tilt near 0.15"
             )
 
     def main_gait(self) -> Vector:

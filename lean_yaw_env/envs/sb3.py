@@ -70,7 +70,7 @@ class WalkerVecEnv(VecEnv):
             self.walkers = WaypointGoalVectorEnv(num_envs, **arguments)
         else:
             self.walkers = WalkerVectorEnv(num_envs, task, **arguments)
-        self.walkers._tells_episodes = True
+        self.walkers._reports_episodes = True
         space = self.walkers.single_observation_space
         super().__init__(num_envs, space, self.walkers.single_action_space)
         self._step_info = step_info

@@ -16,6 +16,7 @@ from lean_yaw_env.kernel.elementary import sine_cosine, within_half_turn
 from lean_yaw_env.kernel.flight import (
     MOST_ATTEMPTS,
     STEP_TOLERANCE,
+    is_collapsing,
     predict_landing,
     time_to_touch,
 )
@@ -63,6 +64,7 @@ START_RESIDUAL = 1e-12
 # Columns of the derivatives: the section state, then the body's constants that are differentiable.
 INPUTS = 12
 _TINY = 1e-30
+_RIGHT_ANGLE = 0.5 * np.pi
 
 
 class PassiveFlight(NamedTuple):
@@ -121,9 +123,18 @@ class PassiveOutcome(NamedTuple):
 
 
 @inlined
-def _is_in_front(inter_leg, pitch, sin_swing_pitch):
-    front = (inter_leg.real > 0.0) & (sin_swing_pitch.real > 0.0) & (pitch.real < 0.0)
-    return 1.0 if front else 0.0
+def _is_in_front(inter_leg, pitch, upright, sin_swing_pitch):
+    """Whether the swing foot may come down on its sole in front; a leg that has swung over the top may not."""
+    front = (inter_leg.real > 0.0) & (inter_leg.real < np.pi) & (pitch.real < 0.0)
+    return 1.0 if front & (upright.real > 0.0) & (sin_swing_pitch.real > 0.0) else 0.0
+
+
+@inlined
+def _is_collapsing(c, pitch, twist):
+    """Whether the ankle is past a right angle, or foot and ankle no longer move the masses apart."""
+    sin_a, cos_a = sine_cosine(pitch + c.tilt)
+    sin_b, cos_b = sine_cosine(twist)
+    return is_collapsing(c, 0.0 * pitch, sin_a, cos_a, sin_b, cos_b, 1.0)
 
 
 @inlined
@@ -141,7 +152,7 @@ def _start(c, pitch, twist, pitch_rate, twist_rate, inter_leg_rate, given):
     _, _, normal, friction = accelerations_and_contact(
         c, time, pitch, twist, pitch_rate, twist_rate
     )
-    gap, gap_rate, gap_acceleration, ahead = swinging_gap(
+    gap, gap_rate, gap_acceleration, upright, ahead = swinging_gap(
         c, pitch, twist, inter_leg, pitch_rate, twist_rate, inter_leg_rate, dw, dv, du
     )
     sin_a, cos_a = sine_cosine(pitch + c.tilt)
@@ -150,13 +161,13 @@ def _start(c, pitch, twist, pitch_rate, twist_rate, inter_leg_rate, given):
     _, _, m11, m12, m22 = mass_matrix(c, sin_a, cos_a, sin_b, z, q, dq)
     rolls_back = (pitch_rate.real >= 0.0) & (dw.real >= 0.0)
     status = BACKWARD if rolls_back else FLYING
-    status = SIDEWAYS if cos_b.real <= 0.0 else status
+    status = SIDEWAYS if _is_collapsing(c, pitch, twist) else status
     status = SLIP if friction.real > c.friction_limit_squared.real else status
     status = LIFT_OFF if normal.real <= 0.0 else status
     status = status if on_floor else TRIP
     return PassiveFlight(
         time, pitch, twist, inter_leg, pitch_rate, twist_rate, inter_leg_rate, dw, dv, du,
-        gap, gap_rate, gap_acceleration, _is_in_front(inter_leg, pitch, ahead), LONGEST_STEP,
+        gap, gap_rate, gap_acceleration, _is_in_front(inter_leg, pitch, upright, ahead), LONGEST_STEP,
         normal.real, friction.real, 0.0, status, pitch, twist, inter_leg,
         kinetic_energy(m11, m12, m22, pitch_rate, twist_rate),
     )  # fmt: skip
@@ -174,8 +185,8 @@ def _advance(c, flight):
     time = flight.time + h
     dw, dv, du = swinging_accelerations(c, x, b, d, w, v, u)
     _, _, normal, friction = accelerations_and_contact(c, time, x, b, w, v)
-    gap, gap_rate, gap_acceleration, ahead = swinging_gap(c, x, b, d, w, v, u, dw, dv, du)
-    front = _is_in_front(d, x, ahead)
+    gap, gap_rate, gap_acceleration, upright, ahead = swinging_gap(c, x, b, d, w, v, u, dw, dv, du)
+    front = _is_in_front(d, x, upright, ahead)
     landing, passed = predict_landing(
         h, flight.gap.real, flight.gap_rate.real, flight.gap_acceleration.real,
         gap.real, gap_rate.real, gap_acceleration.real,
@@ -222,8 +233,8 @@ def _advance(c, flight):
         rolls_back = (w.real >= 0.0) & (dw.real >= 0.0)
         status = (BACKWARD if x.real > 0.0 else SIDEWAYS) if rolls_back else status
         status = LANDING if landed else status
-        cos_b = sine_cosine(b)[1]
-        status = SIDEWAYS if cos_b.real <= 0.0 else status
+        status = LIFT_OFF if x.real <= -_RIGHT_ANGLE else status
+        status = SIDEWAYS if _is_collapsing(c, x, b) else status
         status = SLIP if most > c.friction_limit_squared.real else status
         status = LIFT_OFF if least <= 0.0 else status
     return PassiveFlight(
@@ -257,19 +268,24 @@ def _advance(c, flight):
 def _touch_down(c, flight):
     """Move a landing flight to where the gap is zero, to round-off, by two corrections in time.
 
-    The corrections carry complex parts, so that the landing time has its derivatives.
+    The corrections carry complex parts, so that the landing time has its derivatives. A correction is a step of the midpoint rule: of first
+    order, it would leave the derivatives an error of the window's size.
     """
     time, x, b, d = flight.time, flight.pitch, flight.twist, flight.inter_leg
     w, v, u = flight.pitch_rate, flight.twist_rate, flight.inter_leg_rate
     gap = flight.gap
     for _ in range(2):
         dw, dv, du = swinging_accelerations(c, x, b, d, w, v, u)
-        gap, gap_rate, _, _ = swinging_gap(c, x, b, d, w, v, u, dw, dv, du)
+        gap, gap_rate, _, _, _ = swinging_gap(c, x, b, d, w, v, u, dw, dv, du)
         correction = -gap / gap_rate
+        half = 0.5 * correction
+        dw, dv, du = swinging_accelerations(
+            c, x + half * w, b + half * v, d + half * u, w + half * dw, v + half * dv, u + half * du
+        )
         time = time + correction
-        x = x + correction * (w + 0.5 * correction * dw)
-        b = b + correction * (v + 0.5 * correction * dv)
-        d = d + correction * (u + 0.5 * correction * du)
+        x = x + correction * (w + half * dw)
+        b = b + correction * (v + half * dv)
+        d = d + correction * (u + half * du)
         w = w + correction * dw
         v = v + correction * dv
         u = u + correction * du

@@ -135,7 +135,7 @@ def signed_axis(c, sin_a, cos_a, sin_b, cos_b):
 
 @inlined
 def swinging_gap(c, x, b, d, w, v, u, dw, dv, du):
-    """Height of the swinging foot, its rate and acceleration, and the sine of that foot's pitch."""
+    """Height of the swinging foot, its rate and acceleration, E of ``swing_axis``, and the sine of that foot's pitch."""
     held = with_inter_leg_angle(c, d)
     sin_a, cos_a = sine_cosine(x + c.tilt)
     sin_b, cos_b = sine_cosine(b)
@@ -153,7 +153,7 @@ def swinging_gap(c, x, b, d, w, v, u, dw, dv, du):
         held, sin_a, cos_a, sin_b, cos_b, w, v, dw, dv,
         y, e, s, y_rate, y_acceleration, e_rate, e_acceleration,
     )  # fmt: skip
-    return gap, gap_rate, gap_acceleration, s * c.cos_tilt + y * c.sin_tilt
+    return gap, gap_rate, gap_acceleration, e, s * c.cos_tilt + y * c.sin_tilt
 
 
 @inlined

@@ -1,7 +1,7 @@
 """The paper's nine-coordinate model (section 3.1) with feet of finite mass.
 
-A second opinion on the compiled walker: the same machine written down independently, with
-Lagrange multipliers, derivatives by sympy and integration by scipy. Needs sympy.
+A second opinion on the compiled walker: the same machine written down independently, with Lagrange multipliers, derivatives by sympy and
+integration by scipy. Needs sympy.
 """
 
 from lean_yaw_env.multibody.dynamics import ContactForces
@@ -11,8 +11,13 @@ from lean_yaw_env.multibody.gait import (
     find_passive_gait,
     table3_c_eigenvalues,
 )
-from lean_yaw_env.multibody.results import FALLS, ForceExtremes, MultibodyStep, Trajectory
-from lean_yaw_env.multibody.walker import MultibodyWalker
+from lean_yaw_env.multibody.phase import FALLS
+from lean_yaw_env.multibody.walker import (
+    ForceExtremes,
+    MultibodyStep,
+    MultibodyWalker,
+    Trajectory,
+)
 
 __all__ = [
     "FALLS",

@@ -1,7 +1,7 @@
 """Gaits of the passive nine-coordinate walker, and what they settle about Table 3, column C.
 
-The paper gives 0.72 and 0.51 for that column's lateral pair. No foot mass from 1e-6 to 1e-2 gives
-them (slope 0.00058, ankle tilt 0.15; fore-aft pair, then lateral pair):
+The paper gives 0.72 and 0.51 for that column's lateral pair. No foot mass from 1e-6 to 1e-2 gives them (slope 0.00058, ankle tilt 0.15;
+fore-aft pair, then lateral pair):
 
 ====== ======== ======== ======== ========
 mass   fore-aft fore-aft lateral  lateral
@@ -15,14 +15,12 @@ mass   fore-aft fore-aft lateral  lateral
 1e-2   0.7328   0.0499   0.8082   0.5627
 ====== ======== ======== ======== ========
 
-Mass raises both lateral values, so the first only moves away from 0.72. The second passes 0.51 near
-0.0042, where the fore-aft pair is already 0.71 and 0.09 and not the paper's 0.69 and 0.12; to keep
-that pair as printed, the mass must be below 0.001. The tilt does not bring the two together either:
-at 0.1499 they are 0.789 and 0.513, at 0.1510 they are 0.732 and 0.106. So the paper's small foot
-mass is not the reason, and the disagreement stays open.
+Mass raises both lateral values, so the first only moves away from 0.72. The second passes 0.51 near 0.0042, where the fore-aft pair is already
+0.71 and 0.09 and not the paper's 0.69 and 0.12; to keep that pair as printed, the mass must be below 0.001. The tilt does not bring the two
+together either: at 0.1499 they are 0.789 and 0.513, at 0.1510 they are 0.732 and 0.106. So the paper's small foot mass is not the reason, and
+the disagreement stays open.
 
-Everything here is by finite differences of a reference model: good to about six digits, and no
-more is claimed.
+Everything here is by finite differences of a reference model: good to about six digits, and no more is claimed.
 """
 
 from __future__ import annotations
@@ -34,23 +32,15 @@ from numpy.typing import NDArray
 
 from lean_yaw_env.errors import FellError, NoGaitError
 from lean_yaw_env.multibody.kinematics import Vector
-from lean_yaw_env.multibody.results import MultibodyStep
-from lean_yaw_env.multibody.walker import MultibodyWalker
+from lean_yaw_env.multibody.walker import MultibodyStep, MultibodyWalker
 
 PASSIVE_STATE_FIELDS = (
-    "heading",
-    "stance_pitch",
-    "ankle_angle",
-    "stance_pitch_rate",
-    "ankle_rate",
-    "inter_leg_rate",
-    "inter_leg_angle",
-)
+    "heading", "stance_pitch", "ankle_angle", "stance_pitch_rate", "ankle_rate", "inter_leg_rate", "inter_leg_angle",
+)  # fmt: skip
 """Section state of a passive step followed by the angle at which the swing leg starts.
 
-The angle is no independent initial condition: at heel strike both feet touch the floor. It is
-kept as one, since it is ill-conditioned to compute when the trailing foot's ankle axis is
-vertical, and adds one eigenvalue of zero.
+The angle is no independent initial condition: at heel strike both feet touch the floor. It is kept as one, since it is ill-conditioned to
+compute when the trailing foot's ankle axis is vertical, and adds one eigenvalue of zero.
 """
 
 ComplexVector = NDArray[np.complex128]
@@ -68,12 +58,9 @@ class PassiveGait:
     Attributes
     ----------
     state : shape (7,)
-        In the order of `PASSIVE_STATE_FIELDS`, for left stance.
+        In the order of ``PASSIVE_STATE_FIELDS``, for left stance.
     step : MultibodyStep
         The left stance's step from there.
-    eigenvalues : shape (7,), complex
-        Of the stride map, by falling magnitude. One zero belongs to the inter-leg angle, see
-        `PASSIVE_STATE_FIELDS`.
     stride_jacobian : shape (7, 7)
         By central differences of the mirrored step map, squared.
     residual : float
@@ -82,19 +69,17 @@ class PassiveGait:
 
     state: Vector
     step: MultibodyStep
-    eigenvalues: ComplexVector
     stride_jacobian: Vector
     residual: float
 
+    @property
+    def eigenvalues(self) -> ComplexVector:
+        """Of the stride map, by falling magnitude, shape (7,). One zero belongs to the inter-leg angle, see ``PASSIVE_STATE_FIELDS``."""
+        return _by_magnitude(self.stride_jacobian)
 
-def mirrored_passive_step(walker: MultibodyWalker, state: Vector) -> tuple[Vector, MultibodyStep]:
-    """One left step, its end mirrored back to left stance; twice this is a stride, mirrored twice.
 
-    Raises
-    ------
-    FellError
-        If the walker falls; names the way.
-    """
+def _mirrored_step(walker: MultibodyWalker, state: Vector) -> tuple[Vector, MultibodyStep]:
+    """One left step, its end mirrored back to left stance; twice this is a stride, mirrored twice."""
     step = walker.step(state[:6], inter_leg_angle=float(state[6]), swing="passive")
     if step.fall is not None:
         raise FellError(f"the step from {np.array2string(state, precision=6)} fell: {step.fall}")
@@ -103,11 +88,8 @@ def mirrored_passive_step(walker: MultibodyWalker, state: Vector) -> tuple[Vecto
 
 def _step_jacobian(walker: MultibodyWalker, state: Vector, width: float) -> Vector:
     columns = []
-    for index in range(len(state)):
-        shift = np.zeros(len(state))
-        shift[index] = width
-        ahead, _ = mirrored_passive_step(walker, state + shift)
-        behind, _ = mirrored_passive_step(walker, state - shift)
+    for shift in width * np.eye(len(state)):
+        ahead, behind = (_mirrored_step(walker, state + sign * shift)[0] for sign in (1.0, -1.0))
         columns.append((ahead - behind) / (2.0 * width))
     return np.array(columns).T
 
@@ -130,7 +112,7 @@ def find_passive_gait(
     Parameters
     ----------
     guess : shape (7,)
-        In the order of `PASSIVE_STATE_FIELDS`, for left stance.
+        In the order of ``PASSIVE_STATE_FIELDS``, for left stance.
     difference : float
         Half-width of the central differences.
     residual : float
@@ -145,50 +127,31 @@ def find_passive_gait(
     NoGaitError
         If the walker falls on the way or the iteration does not converge.
     """
-    start = np.array(guess, dtype=np.float64)
-    if start.shape != (len(PASSIVE_STATE_FIELDS),):
-        raise ValueError(f"guess must have shape (7,), got {start.shape}")
-    tried = f"Newton's method from {np.array2string(start, precision=6)}"
+    state = np.array(guess, dtype=np.float64)
+    if state.shape != (len(PASSIVE_STATE_FIELDS),):
+        raise ValueError(f"guess must have shape (7,), got {state.shape}")
+    tried = f"Newton's method from {np.array2string(state, precision=6)}"
+    error = np.inf
     try:
-        gait = _newton(walker, start, difference, residual, max_iterations)
+        for _ in range(max_iterations + 1):
+            after, step = _mirrored_step(walker, state)
+            error = float(np.abs(after - state).max())
+            jacobian = _step_jacobian(walker, state, difference)
+            if error <= residual:
+                return PassiveGait(state, step, jacobian @ jacobian, error)
+            state = state + np.linalg.solve(np.eye(len(state)) - jacobian, after - state)
     except FellError as fell:
         raise NoGaitError(f"{tried}: {fell}") from fell
-    if gait.residual > residual:
-        raise NoGaitError(
-            f"{tried} did not converge in {max_iterations} iterations: residual {gait.residual:.3g}"
-        )
-    return gait
-
-
-def _newton(
-    walker: MultibodyWalker, state: Vector, difference: float, residual: float, iterations: int
-) -> PassiveGait:
-    """The last iterate, whether or not it met ``residual``."""
-    while True:
-        after, step = mirrored_passive_step(walker, state)
-        error = float(np.abs(after - state).max())
-        jacobian = _step_jacobian(walker, state, difference)
-        if error <= residual or iterations <= 0:
-            stride = jacobian @ jacobian
-            return PassiveGait(state, step, _by_magnitude(stride), stride, error)
-        change = np.linalg.solve(np.eye(len(state)) - jacobian, after - state)
-        state = state + np.asarray(change, dtype=np.float64)
-        iterations -= 1
+    raise NoGaitError(
+        f"{tried} did not converge in {max_iterations} iterations: residual {error:.3g}"
+    )
 
 
 @dataclass(frozen=True)
 class Table3Column:
-    """Eigenvalues of the flat passive walker's stride, Table 3, column C, at one foot mass.
+    """Eigenvalues of the flat passive walker's stride, Table 3, column C, with feet of a mass each.
 
-    Attributes
-    ----------
-    foot_mass : float
-        Of each foot.
-    fore_aft, lateral : shapes (4,) and (3,)
-        Eigenvalues by falling magnitude. At zero hip width the two kinds of motion decouple
-        exactly.
-    gait : PassiveGait
-        The gait they belong to.
+    The fore-aft (4,) and the lateral ones (3,), by falling magnitude, of ``gait``. At zero hip width the two kinds of motion decouple exactly.
     """
 
     foot_mass: float
@@ -213,10 +176,7 @@ def table3_c_eigenvalues(
     """
     walker = MultibodyWalker(0.0, 0.5, ankle_tilt, slope, foot_mass=foot_mass)
     gait = find_passive_gait(walker, _TABLE_3_GUESS, difference=difference)
-    stride = gait.stride_jacobian
-    return Table3Column(
-        foot_mass,
-        _by_magnitude(stride[np.ix_(_FORE_AFT, _FORE_AFT)]),
-        _by_magnitude(stride[np.ix_(_LATERAL, _LATERAL)]),
-        gait,
+    fore_aft, lateral = (
+        _by_magnitude(gait.stride_jacobian[np.ix_(part, part)]) for part in (_FORE_AFT, _LATERAL)
     )
+    return Table3Column(foot_mass, fore_aft, lateral, gait)

@@ -10,94 +10,17 @@ from scipy.integrate import DOP853
 from scipy.optimize import root_scalar
 
 from lean_yaw_env.errors import SolverError
-from lean_yaw_env.multibody.dynamics import (
-    Body,
-    ContactForces,
-    Offset,
-    Stance,
-    SwingFoot,
-    accelerations,
-    energy,
-    evaluate,
-    forces_from_multipliers,
-    swing_foot,
-)
-from lean_yaw_env.multibody.kinematics import (
-    LEAN,
-    N_COORDINATES,
-    STANCE_LEG,
-    SWING_LEG,
-    Kinematics,
-    Vector,
-)
-from lean_yaw_env.multibody.shift import Shift
+from lean_yaw_env.multibody.dynamics import ContactForces, Stance
+from lean_yaw_env.multibody.kinematics import LEAN, STANCE_LEG, SWING_LEG, Vector
 
+FALLS = ("trip", "lift-off", "backward", "forward", "sideways", "no-heel-strike")
+"""The ways a step can end other than by heel strike."""
 _SAMPLES_PER_STEP = 8
 """Samples within a step of the integrator at which strike, falls and forces are looked at."""
 _LONGEST_STEP = 20.0
 """Time after which a step without heel strike is given up; a gait's step takes about 1 to 4."""
 _FALLEN_ANGLE = 0.8
 """Pitch or lean, rad, taken as fallen; a point mass tipping from rest lifts off at arccos(2/3)."""
-
-
-@dataclass(frozen=True)
-class Phase:
-    """A stance phase: constants, and what follows from ``y`` = (coordinates, rates), (16,)."""
-
-    body: Body
-    stance: Stance
-    shift: Shift
-    is_held: bool
-
-    def accelerations(self, time: float, y: Vector) -> tuple[Vector, Vector, Kinematics]:
-        """Accelerations, multipliers and kinematics; see ``dynamics.accelerations``."""
-        return accelerations(
-            self.body,
-            self.stance,
-            y[:N_COORDINATES],
-            y[N_COORDINATES:],
-            offset=self.shift.at(time),
-            is_held=self.is_held,
-        )
-
-    def derivative(self, time: float, y: Vector) -> Vector:
-        """Time derivative of ``y``."""
-        return np.concatenate([y[N_COORDINATES:], self.accelerations(time, y)[0]])
-
-    def forces(self, time: float, y: Vector) -> ContactForces:
-        """What the floor does to the stance foot."""
-        return forces_from_multipliers(self.body, self.accelerations(time, y)[1])
-
-    def energies(self, time: float, y: Vector) -> tuple[float, float]:
-        """Kinetic and potential energy."""
-        return energy(
-            self.body, self.stance, y[:N_COORDINATES], y[N_COORDINATES:], self.shift.at(time)
-        )
-
-    def pitch(self, y: Vector) -> float:
-        """Pitch of the stance foot."""
-        here = evaluate(self.body, self.stance, y[:N_COORDINATES], y[N_COORDINATES:], Offset())
-        return here.pitch
-
-    def swing_foot(self, y: Vector) -> SwingFoot:
-        """Where the swing foot is, turned flat."""
-        return swing_foot(self.body, self.stance, y[:N_COORDINATES])
-
-    def is_foot_in_front(self, y: Vector) -> bool:
-        """Whether meeting the floor here is a heel strike, not a passive leg's mid-stance scuff."""
-        foot = self.swing_foot(y)
-        if not foot.is_before_vertical_axis or y[SWING_LEG] <= y[STANCE_LEG]:
-            return False
-        return self.is_held or foot.pitch > 0.0 > self.pitch(y)
-
-    def fall(self, y: Vector, forces: ContactForces) -> str | None:
-        """The way the walker has fallen, if it has."""
-        pitch = self.pitch(y)
-        if abs(y[LEAN]) > _FALLEN_ANGLE:
-            return "sideways"
-        if abs(pitch) > _FALLEN_ANGLE:
-            return "backward" if pitch > 0.0 else "forward"
-        return "lift-off" if forces.normal <= 0.0 else None
 
 
 @dataclass(frozen=True)
@@ -112,12 +35,11 @@ class PhaseEnd:
     forces: tuple[ContactForces, ...]
 
 
-def integrate(phase: Phase, start: Vector, tolerance: float) -> PhaseEnd:
+def integrate(phase: Stance, start: Vector, tolerance: float) -> PhaseEnd:
     """Integrate from ``start``, role coordinates and rates (16,), to heel strike or a fall.
 
-    Heel strike is located to round-off on the integrator's interpolant, which is as accurate as the
-    integration itself (measured: 3e-12 at a tolerance of 1e-11). A fall is noticed on the samples
-    and not located further.
+    Heel strike is located to round-off on the integrator's interpolant, which is as accurate as the integration itself (measured: 3e-12 at a
+    tolerance of 1e-11). A fall is noticed on the samples and not located further.
 
     Raises
     ------
@@ -150,23 +72,40 @@ def integrate(phase: Phase, start: Vector, tolerance: float) -> PhaseEnd:
             before = phase.swing_foot(samples[-1]).clearance
             if before > 0.0 >= phase.swing_foot(y).clearance:
                 strike = _locate(phase, dense, (times[-1], time))
-                if phase.is_foot_in_front(dense(strike)):
+                if _is_foot_in_front(phase, dense(strike)):
                     return end(strike, dense(strike), None)
             force = phase.forces(time, y)
             times.append(time)
             samples.append(y)
             forces.append(force)
-            fall = phase.fall(y, force)
+            fall = _fall(phase, y, force)
             if fall is not None:
                 return end(time, y, fall)
     return end(solver.t, solver.y, "no-heel-strike")
 
 
-def _locate(phase: Phase, dense: Callable[[float], Vector], bracket: tuple[float, float]) -> float:
+def _is_foot_in_front(phase: Stance, y: Vector) -> bool:
+    """Whether meeting the floor here is a heel strike, not a passive leg's mid-stance scuff."""
+    foot = phase.swing_foot(y)
+    if not foot.is_before_vertical_axis or y[SWING_LEG] <= y[STANCE_LEG]:
+        return False
+    return phase.is_held or foot.pitch > 0.0 > phase.pitch(y)[0]
+
+
+def _fall(phase: Stance, y: Vector, forces: ContactForces) -> str | None:
+    """The way the walker has fallen, if it has."""
+    pitch, _ = phase.pitch(y)
+    if abs(y[LEAN]) > _FALLEN_ANGLE:
+        return "sideways"
+    if abs(pitch) > _FALLEN_ANGLE:
+        return "backward" if pitch > 0.0 else "forward"
+    return "lift-off" if forces.normal <= 0.0 else None
+
+
+def _locate(phase: Stance, dense: Callable[[float], Vector], bracket: tuple[float, float]) -> float:
     def clearance(time: float) -> float:
         return phase.swing_foot(dense(time)).clearance
 
     if clearance(bracket[0]) <= 0.0:
         return bracket[0]
-    found = root_scalar(clearance, bracket=bracket, method="brentq", xtol=1e-14, rtol=1e-14)
-    return float(found.root)
+    return root_scalar(clearance, bracket=bracket, method="brentq", xtol=1e-14, rtol=1e-14).root

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import copysign, inf, nan, pi, sin, tan
+from math import cos, inf, nan, pi, sin
 from typing import Any, Literal
 
 import numpy as np
@@ -13,34 +13,112 @@ from lean_yaw_env.multibody.dynamics import (
     Body,
     ContactForces,
     Offset,
+    Shift,
     Stance,
-    energy,
-    evaluate,
     exchange_roles,
-    forces_from_multipliers,
-    impact,
-    place,
-    rates_from_section,
 )
 from lean_yaw_env.multibody.kinematics import (
+    CONTACT,
     LEAN,
     N_COORDINATES,
+    PITCH,
     STANCE_ANKLE,
     STANCE_LEG,
     SWING_LEG,
     Vector,
 )
-from lean_yaw_env.multibody.phase import Phase, PhaseEnd, integrate
-from lean_yaw_env.multibody.results import ForceExtremes, MultibodyStep, Trajectory
-from lean_yaw_env.multibody.shift import Shift
+from lean_yaw_env.multibody.phase import PhaseEnd, integrate
 from lean_yaw_env.validation import require_array, require_choice, require_finite, require_number
 
 SwingMode = Literal["held", "passive"]
 
 
 @dataclass(frozen=True)
+class ForceExtremes:
+    """Extremes over a step, on the samples of the integration; units as in ``ContactForces``."""
+
+    least_normal_force: float
+    greatest_friction: float
+    greatest_yaw_torque: float
+    greatest_hip_torque: float
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A stance phase on the samples of its integration.
+
+    Attributes
+    ----------
+    time : shape (n,)
+        Since the start of the step.
+    coordinates : shape (n, 9)
+        x_h, y_h, z_h, u1 to u6 in the paper's order: centre of the axle, yaw, lean, right and left leg pitch, right and left ankle. The swing
+        ankle is the one that keeps its foot flat; while the swing ankle's axis is vertical that angle is ill-defined.
+    rates : shape (n, 8)
+        Of all coordinates but the swing ankle, which has no inertia, in the same order.
+    forces : tuple of ContactForces
+        At each sample.
+    energies : shape (n, 2)
+        Kinetic and potential.
+    """
+
+    time: Vector
+    coordinates: Vector
+    rates: Vector
+    forces: tuple[ContactForces, ...]
+    energies: Vector
+
+
+@dataclass(frozen=True)
+class MultibodyStep:
+    """One step, from just after a heel strike to just after the next.
+
+    Attributes
+    ----------
+    state : tuple of 5 or 6 floats
+        Section state after the impact (see ``MultibodyWalker.step``); after a fall, the state in which it was noticed.
+    stance : "left" or "right"
+        The foot that stands now.
+    duration : float
+        Of the stance phase.
+    displacement : tuple of 2 floats
+        From the old contact reference point to the new one, x and z; zero after a fall.
+    mass_offset : float
+        Offset in force at the end of the step; differs from the commanded one if heel strike came in mid-shift.
+    inter_leg_angle, inter_leg_rate : float
+        Swing minus stance leg pitch just after the impact (the new swing leg is behind) and its rate.
+    fall : str or None
+        One of ``FALLS``.
+    forces : ForceExtremes
+        Over the stance phase.
+    impulse : ContactForces or None
+        Impulses on the new stance foot; None after a fall.
+    energies : tuple of 3 floats
+        Kinetic plus potential: at the start, at the end before the impact and just after it (nan after a fall).
+    constraint_residual : float
+        Largest violation of a contact constraint, or of its rate, that has built up by the end of the phase.
+    trajectory : Trajectory or None
+        On request.
+    """
+
+    state: tuple[float, ...]
+    stance: str
+    duration: float
+    displacement: tuple[float, float]
+    mass_offset: float
+    inter_leg_angle: float
+    inter_leg_rate: float
+    fall: str | None
+    forces: ForceExtremes
+    impulse: ContactForces | None
+    energies: tuple[float, float, float]
+    constraint_residual: float
+    trajectory: Trajectory | None = None
+
+
+@dataclass(frozen=True)
 class MultibodyWalker(Body):
-    """The paper's walker with feet of finite mass, a second opinion on the massless-foot walker.
+    """The paper's walker with feet of finite mass, a second opinion on the massless-foot walker; about 20 ms a step.
 
     Parameters
     ----------
@@ -57,10 +135,6 @@ class MultibodyWalker(Body):
     ------
     ValueError
         If a parameter is out of range.
-
-    Notes
-    -----
-    Exact in the model, slow by design: about 20 ms a step.
     """
 
     foot_mass: float = 1e-3
@@ -89,14 +163,13 @@ class MultibodyWalker(Body):
         Parameters
         ----------
         state : 5 or 6 floats
-            Heading, stance pitch, ankle angle, stance pitch rate, ankle rate just after heel
-            strike; for a passive swing leg the inter-leg rate may follow.
+            Heading, stance pitch, ankle angle, stance pitch rate, ankle rate just after heel strike; for a passive swing leg the inter-leg
+            rate may follow. The new state has as many entries as the swing mode needs: 5 when held, 6 when passive.
         stance : "left" or "right"
             The foot that stands.
         inter_leg_angle : float
-            Held swing leg: the angle at which it is held from the start. Passive: the angle at
-            which it starts, negative as it is behind (`MultibodyStep.inter_leg_angle` of the step
-            before).
+            Held swing leg: the angle at which it is held from the start. Passive: the angle at which it starts, negative as it is behind
+            (``MultibodyStep.inter_leg_angle`` of the step before).
         mass_offset : float
             Offset of the hip masses along the axle, positive to the right.
         previous_offset : float, optional
@@ -108,40 +181,31 @@ class MultibodyWalker(Body):
         trajectory : bool
             Keep the samples of the stance phase.
 
-        Returns
-        -------
-        MultibodyStep
-            Its state has as many entries as the swing mode needs: 5 when held, 6 when passive.
-
         Raises
         ------
         ValueError
             If an argument is out of range or missing.
+        SolverError
+            If the integrator fails.
         """
         phase, start = self._start(
             state, stance, inter_leg_angle, mass_offset, previous_offset, swing, swing_rate
         )
         end = integrate(phase, start, self.tolerance)
-        kept = _trajectory(phase, end) if trajectory else None
-        return _result(phase, start, end, kept)
+        return _result(phase, start, end, _trajectory(phase, end) if trajectory else None)
 
     def stance_accelerations(
         self, state: Sequence[float] | Vector, **options: Any
     ) -> tuple[float, ...]:
-        """Second derivatives of stance pitch and ankle, and of the inter-leg angle if passive.
-
-        Arguments and errors as for `step`; evaluated at the start of the step.
-        """
+        """Second derivatives of stance pitch and ankle, and of the inter-leg angle if passive, at the start of a step. Arguments as for ``step``."""
         phase, y = self._start(state, **options)
         second, _, here = phase.accelerations(0.0, y)
-        pitch = float(here.pitch_jacobian[:N_COORDINATES] @ second) + here.pitch_bias
-        independent = (pitch, float(second[STANCE_ANKLE]))
-        if phase.is_held:
-            return independent
-        return (*independent, float(second[SWING_LEG] - second[STANCE_LEG]))
+        pitch = float(here.jacobian[PITCH, :N_COORDINATES] @ second + here.bias[PITCH])
+        swing = () if phase.is_held else (float(second[SWING_LEG] - second[STANCE_LEG]),)
+        return (pitch, float(second[STANCE_ANKLE]), *swing)
 
     def contact_forces(self, state: Sequence[float] | Vector, **options: Any) -> ContactForces:
-        """Contact forces at the start of a step. Arguments and errors as for `step`."""
+        """Contact forces at the start of a step. Arguments as for ``step``."""
         phase, y = self._start(state, **options)
         return phase.forces(0.0, y)
 
@@ -154,7 +218,7 @@ class MultibodyWalker(Body):
         previous_offset: float | None = None,
         swing: SwingMode = "held",
         swing_rate: float | None = None,
-    ) -> tuple[Phase, Vector]:
+    ) -> tuple[Stance, Vector]:
         require_choice("stance", stance, ("left", "right"))
         is_held = require_choice("swing", swing, ("held", "passive")) == "held"
         numbers = tuple(require_array("state", state, (None,)).tolist())
@@ -165,14 +229,10 @@ class MultibodyWalker(Body):
         require_number(angle, inter_leg_angle, *limits, "()")
         require_finite("mass_offset", mass_offset)
         require_finite("previous_offset", before)
-        heading, pitch, ankle, pitch_rate, ankle_rate = numbers[:5]
-        standing = Stance(1.0 if stance == "left" else -1.0, heading)
-        phase = Phase(self, standing, Shift(before, mass_offset, self.shift_time), is_held)
-        coordinates = place(self, standing, pitch, ankle, inter_leg_angle)
-        rates = rates_from_section(
-            self, standing, coordinates, pitch_rate, ankle_rate, inter_leg_rate
-        )
-        return phase, np.concatenate([coordinates, rates])
+        shift = Shift(before, mass_offset, self.shift_time)
+        side = 1.0 if stance == "left" else -1.0
+        phase = Stance(self, side, numbers[0], shift=shift, is_held=is_held)
+        return phase, phase.placed(numbers[1:5], inter_leg_angle, inter_leg_rate)
 
 
 def _inter_leg_rate(state: tuple[float, ...], is_held: bool, swing_rate: float | None) -> float:
@@ -192,101 +252,66 @@ def _inter_leg_rate(state: tuple[float, ...], is_held: bool, swing_rate: float |
     )
 
 
-def _extremes(forces: tuple[ContactForces, ...]) -> ForceExtremes:
-    return ForceExtremes(
-        least_normal_force=min(force.normal for force in forces),
-        greatest_friction=max(force.friction_demand for force in forces),
-        greatest_yaw_torque=max(abs(force.yaw_torque) for force in forces),
-        greatest_hip_torque=max(abs(force.hip_torque) for force in forces),
-    )
-
-
-def _section(
-    body: Body, stance: Stance, y: Vector, *, is_held: bool
-) -> tuple[tuple[float, ...], float, float]:
-    """Section state, inter-leg angle and its rate at coordinates and rates ``y`` (16,)."""
-    coordinates, rates = y[:N_COORDINATES], y[N_COORDINATES:]
-    here = evaluate(body, stance, coordinates, rates, Offset())
-    inter_leg_rate = float(rates[SWING_LEG] - rates[STANCE_LEG])
-    state = (
-        stance.heading,
-        here.pitch,
-        float(coordinates[STANCE_ANKLE]),
-        float(here.pitch_jacobian[:N_COORDINATES] @ rates),
-        float(rates[STANCE_ANKLE]),
-    )
-    angle = float(coordinates[SWING_LEG] - coordinates[STANCE_LEG])
-    return (state if is_held else (*state, inter_leg_rate)), angle, inter_leg_rate
-
-
-def _residual(phase: Phase, y: Vector) -> float:
-    here = evaluate(phase.body, phase.stance, y[:N_COORDINATES], y[N_COORDINATES:], Offset())
-    drift = here.constraint_jacobian[:, :N_COORDINATES] @ y[N_COORDINATES:]
-    return float(max(np.abs(here.constraints).max(), np.abs(drift).max()))
-
-
-def _side(stance: Stance) -> str:
-    return "left" if stance.side > 0.0 else "right"
-
-
 def _result(
-    phase: Phase, start: Vector, end: PhaseEnd, trajectory: Trajectory | None
+    phase: Stance, start: Vector, end: PhaseEnd, trajectory: Trajectory | None
 ) -> MultibodyStep:
-    body, offset = phase.body, phase.shift.at(end.time)
-    at_start = sum(phase.energies(0.0, start))
-    kinetic, potential = phase.energies(end.time, end.y)
-    stance, y, impulse, after = phase.stance, end.y, None, nan
-    displacement = (0.0, 0.0)
+    offset = phase.shift.at(end.time)
+    stance, y, impulse, after = phase, end.y, None, nan
     if end.fall is None:
         foot = phase.swing_foot(end.y)
-        roll = body.foot_radius * foot.pitch
-        displacement = (
-            float(foot.centre[0] + roll * np.cos(foot.heading)),
-            float(foot.centre[2] - roll * np.sin(foot.heading)),
-        )
-        stance = Stance(-phase.stance.side, foot.heading, displacement)
-        coordinates = exchange_roles(end.y[:N_COORDINATES], foot.ankle)
-        rates, impulses = impact(
-            body, stance, coordinates, exchange_roles(end.y[N_COORDINATES:], 0.0), offset
-        )
-        y = np.concatenate([coordinates, rates])
-        impulse = forces_from_multipliers(body, impulses)
-        after = sum(energy(body, stance, coordinates, rates, Offset(offset.value)))
-    state, angle, rate = _section(body, stance, y, is_held=phase.is_held)
+        roll = phase.body.foot_radius * foot.pitch
+        x, _, z = foot.centre.tolist()
+        contact = (x + roll * cos(foot.heading), z - roll * sin(foot.heading))
+        stance = Stance(phase.body, -phase.side, foot.heading, contact)
+        y, impulse = stance.impact(exchange_roles(end.y, foot.ankle), offset)
+        after = sum(stance.energies(y, Offset(offset.value)))
+    pitch, pitch_rate = stance.pitch(y)
+    angles, rates = y[:N_COORDINATES], y[N_COORDINATES:]
+    inter_leg_rate = float(rates[SWING_LEG] - rates[STANCE_LEG])
+    ankle, ankle_rate = float(angles[STANCE_ANKLE]), float(rates[STANCE_ANKLE])
+    swing = () if phase.is_held else (inter_leg_rate,)
+    here = phase.kinematics(end.y)
+    drift = here.jacobian[CONTACT, :N_COORDINATES] @ end.y[N_COORDINATES:]
     return MultibodyStep(
-        state=state,
-        stance=_side(stance),
+        state=(stance.heading, pitch, ankle, pitch_rate, ankle_rate, *swing),
+        stance="left" if stance.side > 0.0 else "right",
         duration=end.time,
-        displacement=displacement,
+        displacement=stance.contact,
         mass_offset=offset.value,
-        inter_leg_angle=angle,
-        inter_leg_rate=rate,
+        inter_leg_angle=float(angles[SWING_LEG] - angles[STANCE_LEG]),
+        inter_leg_rate=inter_leg_rate,
         fall=end.fall,
-        forces=_extremes(end.forces),
+        forces=ForceExtremes(
+            least_normal_force=min(force.normal for force in end.forces),
+            greatest_friction=max(force.friction_demand for force in end.forces),
+            greatest_yaw_torque=max(abs(force.yaw_torque) for force in end.forces),
+            greatest_hip_torque=max(abs(force.hip_torque) for force in end.forces),
+        ),
         impulse=impulse,
-        energies=(at_start, kinetic + potential, after),
-        constraint_residual=_residual(phase, end.y),
+        energies=(
+            sum(phase.energies(start, phase.shift.at(0.0))),
+            sum(phase.energies(end.y, offset)),
+            after,
+        ),
+        constraint_residual=float(np.abs([here.values[CONTACT], drift]).max()),
         trajectory=trajectory,
     )
 
 
-def _trajectory(phase: Phase, end: PhaseEnd) -> Trajectory:
-    is_left = phase.stance.side > 0.0
-    coordinates, rates = [], []
-    for y in end.samples:
-        role, role_rates = y[:N_COORDINATES], y[N_COORDINATES:]
-        ahead = sin(role[SWING_LEG] + phase.body.ankle_tilt)
-        swing_ankle = float(np.arctan2(copysign(1.0, ahead) * tan(role[LEAN]), abs(ahead)))
-        ankles = (swing_ankle, role[STANCE_ANKLE])
-        order = (SWING_LEG, STANCE_LEG) if is_left else (STANCE_LEG, SWING_LEG)
-        coordinates.append([*role[:5], *role[list(order)], *(ankles if is_left else ankles[::-1])])
-        rates.append([*role_rates[:5], *role_rates[list(order)], role_rates[STANCE_ANKLE]])
+def _trajectory(phase: Stance, end: PhaseEnd) -> Trajectory:
+    coordinates, rates = np.split(np.array(end.samples), 2, axis=1)
+    legs = [SWING_LEG, STANCE_LEG]
+    ahead = np.sin(coordinates[:, SWING_LEG] + phase.body.ankle_tilt)
+    sign = np.copysign(1.0, ahead)
+    swing_ankle = np.arctan2(sign * np.tan(coordinates[:, LEAN]), np.abs(ahead))
+    ankles = np.column_stack([swing_ankle, coordinates[:, STANCE_ANKLE]])
+    if phase.side < 0.0:
+        legs, ankles = legs[::-1], ankles[:, ::-1]
+    times = zip(end.times, end.samples, strict=True)
     return Trajectory(
         time=np.array(end.times),
-        coordinates=np.array(coordinates),
-        rates=np.array(rates),
+        coordinates=np.hstack([coordinates[:, :5], coordinates[:, legs], ankles]),
+        rates=rates[:, [*range(5), *legs, STANCE_ANKLE]],
         forces=end.forces,
-        energies=np.array(
-            [phase.energies(t, y) for t, y in zip(end.times, end.samples, strict=True)]
-        ),
+        energies=np.array([phase.energies(y, phase.shift.at(time)) for time, y in times]),
     )

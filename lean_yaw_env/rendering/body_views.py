@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.rendering.camera import BodyCamera, Panel, body_camera, upward
@@ -106,20 +107,19 @@ def _draw_leg(canvas: Canvas, camera: BodyCamera, leg: LegShape, fading: float) 
     _draw_foot(canvas, camera, leg, colour)
     hip, ankle = camera.pixels(np.array([leg.hip, leg.ankle]))
     canvas.bar(hip, ankle, colour, 0.03 * camera.scale)
-    above, below = camera.pixels(
-        np.array([leg.ankle - AXIS_ABOVE * leg.ankle_axis, leg.ankle + AXIS_BELOW * leg.ankle_axis])
-    )
+    below, above = camera.pixels(leg.axis_ends(AXIS_BELOW, AXIS_ABOVE))
     canvas.dashes(below, above, mixed(ANKLE_AXIS, SKY, fading), 1.5)
 
 
 def _draw_foot(canvas: Canvas, camera: BodyCamera, leg: LegShape, colour: Colour) -> None:
     """The part of the cylinder under the leg, filled up to the chord between heel and toe."""
     corners = camera.pixels(np.vstack([leg.inner_arc, leg.outer_arc]))
-    outline = _hull(corners)
-    if len(outline) >= 3:
-        canvas.polygon(outline, mixed(colour, SKY, 0.55), colour, 1.5)
-    else:
+    try:
+        outline = corners[ConvexHull(np.round(corners, 6)).vertices]
+    except QhullError:  # all on a line
         canvas.bar(corners[0], corners[-1], colour, 3.0)
+    else:
+        canvas.polygon(outline, mixed(colour, SKY, 0.55), colour, 1.5)
 
 
 def _draw_axle(canvas: Canvas, camera: BodyCamera, shape: WalkerShape) -> None:
@@ -137,24 +137,3 @@ def _draw_masses(canvas: Canvas, camera: BodyCamera, shape: WalkerShape) -> None
     canvas.disc(camera.pixels(shape.centre), 4.0, SKY)
     canvas.ring(camera.pixels(shape.centre), 4.5, INK, 1.5)
     canvas.disc(camera.pixels(shape.centre), 1.5, INK)
-
-
-def _hull(points: Vector) -> Vector:
-    """Corners of the convex hull of points in the plane; two or fewer if they are on a line.
-
-    Andrew's monotone chain.
-    """
-    ordered = np.unique(np.round(points, 6), axis=0).tolist()
-
-    def chain(sequence: list[list[float]]) -> list[list[float]]:
-        corners: list[list[float]] = []
-        for x, y in sequence:
-            while len(corners) >= 2:
-                (x1, y1), (x2, y2) = corners[-2:]
-                if (x2 - x1) * (y - y1) - (y2 - y1) * (x - x1) > 1e-9:
-                    break
-                corners.pop()
-            corners.append([x, y])
-        return corners[:-1]
-
-    return np.array(chain(ordered) + chain(ordered[::-1])).reshape(-1, 2)

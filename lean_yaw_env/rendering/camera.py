@@ -37,13 +37,7 @@ class Panel(NamedTuple):
 class FloorCamera:
     """Looks straight down on the floor: downhill is up on the picture, right is right.
 
-    Attributes
-    ----------
-    panel : Panel
-    centre : shape (2,)
-        Point of the floor in the panel's middle, (downhill, right).
-    scale : float
-        Pixels per leg length.
+    ``centre`` (2,) is the point of the floor in the panel's middle, (downhill, right); ``scale`` is in pixels per leg length.
     """
 
     panel: Panel
@@ -74,21 +68,13 @@ def floor_camera(
     least_scale: float,
     greatest_scale: float,
 ) -> FloorCamera:
-    """A camera that shows all points as long as its least scale allows it, and always the subject.
+    """A camera that shows all points (n, 2) as long as its least scale allows it, and always the subject (2,).
 
-    It depends on its arguments continuously, so it follows a moving subject without a jolt.
-
-    Parameters
-    ----------
-    points : shape (n, 2)
-    subject : shape (2,)
-    border : float
-        Pixels to leave around the points.
-    least_scale, greatest_scale : float
-        Pixels per leg length.
+    It depends on its arguments continuously, so it follows a moving subject without a jolt. ``border`` is in pixels, to be left around the
+    points; scales are in pixels per leg length.
     """
-    low = np.minimum(points.min(axis=0), subject) if len(points) else subject
-    high = np.maximum(points.max(axis=0), subject) if len(points) else subject
+    shown = np.vstack([points, subject])
+    low, high = shown.min(axis=0), shown.max(axis=0)
     room = np.array([panel.height, panel.width]) - 2.0 * border
     fit = float((room / np.maximum(high - low, 1e-9)).min())
     scale = min(max(fit, least_scale), greatest_scale)
@@ -99,19 +85,10 @@ def floor_camera(
 
 @dataclass(frozen=True, eq=False)
 class BodyCamera:
-    """Looks at the walker along a level line, without perspective; gravity points down on the
-    picture.
+    """Looks at the walker along a level line, without perspective; gravity points down on the picture.
 
-    Attributes
-    ----------
-    panel : Panel
-    right, up, toward : shape (3,)
-        Unit vectors in the floor frame: rightward and upward on the picture, and to the viewer.
-    subject : shape (3,)
-        Point of space at ``place`` on the picture.
-    place : shape (2,)
-    scale : float
-        Pixels per leg length.
+    ``right``, ``up`` and ``toward`` (3,) are unit vectors in the floor frame: rightward and upward on the picture, and to the viewer. The point
+    ``subject`` (3,) of space comes to ``place`` (2,) on the picture; ``scale`` is in pixels per leg length.
     """
 
     panel: Panel
@@ -133,10 +110,7 @@ class BodyCamera:
 
 
 def upward(parameters: WalkerParameters, heading: float) -> Vector:
-    """Unit vector against gravity in the floor frame; shape (3,).
-
-    A slope that turns with the walker falls to where its stance foot heads.
-    """
+    """Unit vector against gravity in the floor frame, (3,). A slope that turns with the walker falls to where its stance foot heads."""
     falls_to = heading if parameters.slope_turns else 0.0
     sine, cosine = math.sin(parameters.slope), math.cos(parameters.slope)
     return np.array([-sine * math.cos(falls_to), cosine, sine * math.sin(falls_to)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,31 +23,28 @@ class Canvas:
 
     Parameters
     ----------
-    width, height : int
+    size : (width, height)
         Of the finished picture, pixels.
     background : Colour
     """
 
-    def __init__(self, width: int, height: int, background: Colour) -> None:
+    def __init__(self, size: tuple[int, int], background: Colour) -> None:
         with needs_extra("render"):
             import pygame
             import pygame.freetype
         self._pygame: Any = pygame
-        self._freetype: Any = pygame.freetype
-        self._size = (width, height)
+        self._size = size
         # a depth of its own, not a display's: the same pixels with and without a window
-        fine = (OVERSAMPLING * width, OVERSAMPLING * height)
-        self._surface = self._pygame.Surface(fine, 0, 32)
+        self._surface = self._pygame.Surface(_whole(size), 0, 32)
         self._background = background
         self.clear()
 
     def clear(self) -> None:
         """Start a picture."""
         self._surface.fill(self._background)
-        # anew for each picture, for another user of pygame may have quit it meanwhile; pygame's
-        # own, so that every machine draws the same letters
-        self._freetype.init()
-        self._font = self._freetype.Font(None, OVERSAMPLING * TEXT_SIZE)
+        # anew for each picture, for another user of pygame may have quit it meanwhile; pygame's own, so that every machine draws the same letters
+        self._pygame.freetype.init()
+        self._font = self._pygame.freetype.Font(None, OVERSAMPLING * TEXT_SIZE)
         self._font.origin = True
 
     def surface(self) -> Any:
@@ -55,22 +53,15 @@ class Canvas:
 
     def array(self) -> np.ndarray:
         """The finished picture; shape (height, width, 3), uint8."""
-        width, height = self._size
-        pixels = self._pygame.image.tobytes(self.surface(), "RGB")
-        return np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, 3).copy()
+        return self._pygame.surfarray.array3d(self.surface()).swapaxes(0, 1).copy()
 
     def clip(self, panel: Panel | None) -> None:
         """Keep what follows within a panel; None ends that."""
-        rectangle = None if panel is None else [round(OVERSAMPLING * value) for value in panel]
-        self._surface.set_clip(rectangle)
+        self._surface.set_clip(None if panel is None else _whole(panel))
 
     def rectangle(self, panel: Panel, colour: Colour, corner: float = 0.0) -> None:
-        self._pygame.draw.rect(
-            self._surface,
-            colour,
-            [round(OVERSAMPLING * value) for value in panel],
-            border_radius=round(OVERSAMPLING * corner),
-        )
+        (radius,) = _whole([corner])
+        self._pygame.draw.rect(self._surface, colour, _whole(panel), border_radius=radius)
 
     def polygon(
         self, points: Vector, fill: Colour | None, edge: Colour | None = None, width: float = 1.0
@@ -80,14 +71,12 @@ class Canvas:
         if fill is not None:
             self._pygame.draw.polygon(self._surface, fill, corners)
         if edge is not None:
-            thickness = max(1, round(OVERSAMPLING * width))
-            self._pygame.draw.lines(self._surface, edge, True, corners, thickness)
+            self._pygame.draw.lines(self._surface, edge, True, corners, _thickness(width))
 
     def lines(self, points: Vector, colour: Colour, width: float = 1.0) -> None:
         """A thin line through points; shape (n, 2)."""
         if len(points) >= 2:
-            thickness = max(1, round(OVERSAMPLING * width))
-            self._pygame.draw.lines(self._surface, colour, False, _fine(points), thickness)
+            self._pygame.draw.lines(self._surface, colour, False, _fine(points), _thickness(width))
 
     def bar(self, start: Vector, end: Vector, colour: Colour, width: float) -> None:
         """A straight bar with round ends, of any direction and any width."""
@@ -97,8 +86,8 @@ class Canvas:
             aside = 0.5 * width / length * np.array([-along[1], along[0]])
             self.polygon(np.array([start + aside, end + aside, end - aside, start - aside]), colour)
         if width >= 1.5:
-            self.disc(start, 0.5 * width, colour)
-            self.disc(end, 0.5 * width, colour)
+            for place in (start, end):
+                self.disc(place, 0.5 * width, colour)
 
     def dashes(
         self, start: Vector, end: Vector, colour: Colour, width: float, dash: float = 5.0
@@ -106,24 +95,15 @@ class Canvas:
         """A straight dashed line; equal dashes and gaps, a dash at each end."""
         count = max(1, 2 * round(0.5 * (np.linalg.norm(end - start) / dash - 1.0)) + 1)
         for i in range(0, count, 2):
-            self.bar(
-                start + (end - start) * i / count,
-                start + (end - start) * (i + 1) / count,
-                colour,
-                width,
-            )
+            left, right = (start + (end - start) * k / count for k in (i, i + 1))
+            self.bar(left, right, colour, width)
 
     def disc(self, centre: Vector, radius: float, colour: Colour) -> None:
         self._pygame.draw.circle(self._surface, colour, _fine(centre), OVERSAMPLING * radius)
 
     def ring(self, centre: Vector, radius: float, colour: Colour, width: float = 1.0) -> None:
-        self._pygame.draw.circle(
-            self._surface,
-            colour,
-            _fine(centre),
-            OVERSAMPLING * radius,
-            max(1, round(OVERSAMPLING * width)),
-        )
+        size = OVERSAMPLING * radius, _thickness(width)
+        self._pygame.draw.circle(self._surface, colour, _fine(centre), *size)
 
     def arrow(self, start: Vector, end: Vector, colour: Colour, width: float) -> None:
         """An arrow with its tip at ``end``."""
@@ -132,9 +112,8 @@ class Canvas:
         neck = end - 4.5 * width * along
         self.bar(start, neck, colour, width)
         barb = end - 5.0 * width * along
-        self.polygon(
-            np.array([end, barb + 2.2 * width * aside, neck, barb - 2.2 * width * aside]), colour
-        )
+        wing = 2.2 * width * aside
+        self.polygon(np.array([end, barb + wing, neck, barb - wing]), colour)
 
     def text(
         self,
@@ -150,8 +129,7 @@ class Canvas:
         Parameters
         ----------
         place, anchor : (float, float)
-            ``anchor`` says which point of the line's box comes to ``place``: (0, 0) the upper left,
-            (1, 1) the lower right.
+            ``anchor`` says which point of the line's box comes to ``place``: (0, 0) the upper left, (1, 1) the lower right.
         size : float
             Height of the letters' box, pixels.
         ground : Colour, optional
@@ -166,9 +144,9 @@ class Canvas:
         top = OVERSAMPLING * place[1] - anchor[1] * height
         if ground is not None:
             margin = 0.35 * fine
-            patch = [left - margin, top - margin, width + 2.0 * margin, height + 2.0 * margin]
-            self._pygame.draw.rect(
-                self._surface, ground, [round(v) for v in patch], border_radius=round(margin)
+            patch = Panel(left - margin, top - margin, width + 2.0 * margin, height + 2.0 * margin)
+            self.rectangle(
+                Panel(*(value / OVERSAMPLING for value in patch)), ground, margin / OVERSAMPLING
             )
         baseline = (round(left), round(top + height))
         self._font.render_to(self._surface, baseline, words, colour, size=fine)
@@ -176,4 +154,14 @@ class Canvas:
 
 
 def _fine(points: Vector) -> list[Any]:
+    """Places on the finer grid."""
     return (OVERSAMPLING * points).tolist()
+
+
+def _whole(values: Sequence[float]) -> list[int]:
+    """Whole pixels of the finer grid."""
+    return [round(OVERSAMPLING * value) for value in values]
+
+
+def _thickness(width: float) -> int:
+    return max(1, *_whole([width]))

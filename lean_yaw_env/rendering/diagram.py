@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from lean_yaw_env.parameters import Foot, Vector, WalkerParameters
 from lean_yaw_env.rendering.camera import upward
 from lean_yaw_env.rendering.figures import ENDINGS, new_figure, save_figure
 from lean_yaw_env.rendering.footprints import footprint_length, footprint_outlines
-from lean_yaw_env.rendering.geometry import LegShape, Pose, WalkerShape, walker_shape
+from lean_yaw_env.rendering.geometry import LegShape, Pose, walker_shape
 from lean_yaw_env.rendering.palette import (
     ANKLE_AXIS,
     COMMAND,
@@ -36,15 +36,15 @@ _LEAST_SLOPE = 0.09  # a gait's own slope would look level
 _INCHES = 2.9  # per leg length
 _HEIGHT = 1.45  # of each drawing, in leg lengths
 _AXIS_ABOVE, _AXIS_BELOW = 0.42, 0.14
+_WHITE: Colour = (255, 255, 255)
+_AXLE = mixed(INK, _WHITE, 0.3)
 _RIGHT, _UP = np.array([1.0, 0.0]), np.array([0.0, 1.0])
 
 
 def draw_walker(parameters: WalkerParameters, path: str | os.PathLike[str]) -> None:
-    """Draw the walker from the side, from behind and from above, with its parameters' names, to a
-    .png, .svg or .pdf.
+    """Draw the walker from the side, from behind and from above, with its parameters' names, to a .png, .svg or .pdf.
 
-    The proportions are the parameters'; the pose, and a slope too slight to be seen, are
-    exaggerated, and the picture says so.
+    The proportions are the parameters'; the pose, and a slope too slight to be seen, are exaggerated, and the picture says so.
 
     Raises
     ------
@@ -82,16 +82,6 @@ def _caption(parameters: WalkerParameters) -> str:
     return (5 * " ").join(values) + "\n" + coordinates
 
 
-class _View:
-    """Points of space on the page: rightward and upward unit vectors of the floor frame."""
-
-    def __init__(self, right: Vector, up: Vector) -> None:
-        self._axes = np.column_stack([right, up])
-
-    def __call__(self, points: Vector) -> Vector:
-        return points @ self._axes
-
-
 def _draw_side(axes: Axes, parameters: WalkerParameters) -> None:
     slope = parameters.slope
     if slope != 0.0:
@@ -99,67 +89,62 @@ def _draw_side(axes: Axes, parameters: WalkerParameters) -> None:
     pose = Pose(np.array([0.0, _STANCE_PITCH, 0.0, 0.0, 0.0]), "right", _INTER_LEG_ANGLE)
     shape = walker_shape(parameters, pose)
     up = upward(replace(parameters, slope=slope, slope_turns=False), 0.0)
-    view = _View(np.cross(up, np.array([0.0, 0.0, 1.0])), up)
-    downhill, normal = view(np.array([1.0, 0.0, 0.0])), view(np.array([0.0, 1.0, 0.0]))
-    contact = view(shape.contact)
+    view = np.column_stack([np.cross(up, np.array([0.0, 0.0, 1.0])), up])  # to the page's axes
+    downhill, normal, _ = view
+    contact = shape.contact @ view
     _draw_floor(axes, contact, downhill, 0.6, 0.85)
     _draw_leg(axes, view, shape.swing_leg, 0.5)
     _draw_leg(axes, view, shape.stance_leg, 0.0)
-    hip = view(shape.stance_leg.hip)
-    _draw_mass(axes, hip)
+    hip, ankle, axis = (
+        part @ view
+        for part in (shape.stance_leg.hip, shape.stance_leg.ankle, shape.stance_leg.ankle_axis)
+    )
+    _draw_masses(axes, hip)
     if slope != 0.0:
         start = contact - 0.57 * downhill if slope > 0.0 else contact + 0.82 * downhill
         ahead = _RIGHT if slope > 0.0 else -_RIGHT
         along = downhill if slope > 0.0 else -downhill
         _line(axes, start, start + 0.4 * ahead, FAINT_INK, 0.8, "--")
         _draw_angle(axes, start, ahead, along, 0.3, r"$\gamma$")
-    ankle = view(shape.stance_leg.ankle)
     _line(axes, ankle, ankle + 0.75 * normal, FAINT_INK, 0.8, "--")
     _draw_angle(axes, ankle, normal, hip - ankle, 0.66, r"$\theta$")
-    axis = view(shape.stance_leg.ankle_axis)
     _draw_angle(axes, ankle, hip - ankle, -axis, 0.38, r"$\alpha$", ANKLE_AXIS)
-    _draw_angle(axes, hip, ankle - hip, view(shape.swing_leg.ankle) - hip, 0.5, r"$\Delta$")
-    _draw_radius(axes, view, shape, parameters.foot_radius)
-    _draw_gravity(axes, np.array([hip[0] + 0.62, hip[1]]))
+    _draw_angle(axes, hip, ankle - hip, shape.swing_leg.ankle @ view - hip, 0.5, r"$\Delta$")
+    if parameters.foot_radius > 0.0:
+        leg = shape.swing_leg
+        centre, toe = leg.centre @ view, 0.5 * (leg.inner_arc + leg.outer_arc)[-1] @ view
+        _line(axes, centre, toe, INK, 0.9)
+        axes.plot(*centre, marker="+", color=unit_colour(INK), markersize=6)
+        _label(axes, 0.5 * (centre + toe), "$r$", (8, 2))
+    aside = np.array([hip[0] + 0.62, hip[1]])
+    _draw_arrow(axes, aside, -0.22 * _UP, COMMAND)
+    _label(axes, aside - 0.11 * _UP, "$g$", (9, 0), COMMAND)
     _label(axes, hip + 0.4 * (ankle - hip), "1", (-10, 0))
     _set_window(axes, contact - np.array([0.75, 0.25]), 1.7)
-
-
-def _draw_radius(axes: Axes, view: _View, shape: WalkerShape, radius: float) -> None:
-    if radius == 0.0:
-        return
-    leg = shape.swing_leg
-    centre = view(leg.centre)
-    toe = view(0.5 * (leg.inner_arc + leg.outer_arc)[-1])
-    _line(axes, centre, toe, INK, 0.9)
-    axes.plot(*centre, marker="+", color=unit_colour(INK), markersize=6)
-    _label(axes, 0.5 * (centre + toe), "$r$", (8, 2))
 
 
 def _draw_rear(axes: Axes, parameters: WalkerParameters) -> None:
     pose = Pose(np.array([0.0, 0.0, -_LEAN, 0.0, 0.0]), "right", 0.45, mass_offset=_MASS_OFFSET)
     shape = walker_shape(parameters, pose)
-    view = _View(np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]))
-    contact = view(shape.contact)
+    view = np.eye(3)[:, [2, 1]]
+    contact = shape.contact @ view
     _draw_floor(axes, contact, _RIGHT, 0.35 + parameters.hip_width, 0.35)
     _draw_leg(axes, view, shape.swing_leg, 0.5)
     _draw_leg(axes, view, shape.stance_leg, 0.0)
-    hips = view(np.array([shape.swing_leg.hip, shape.stance_leg.hip]))
-    masses = view(shape.masses)
-    along = view(shape.axle)
-    _line(axes, hips[0], masses[1], mixed(INK, (255, 255, 255), 0.3), 2.5)
-    for mass in masses:
-        _draw_mass(axes, mass)
+    hips = np.array([shape.swing_leg.hip, shape.stance_leg.hip]) @ view
+    masses = shape.masses @ view
+    along = shape.axle @ view
+    _line(axes, hips[0], masses[1], _AXLE, 2.5)
+    _draw_masses(axes, *masses)
     across = np.array([-along[1], along[0]])
     if parameters.hip_width > 0.0:
         _draw_span(axes, hips[0] + 0.2 * across, hips[1] + 0.2 * across, "$d$")
     _draw_span(axes, hips[1] + 0.09 * across, masses[1] + 0.09 * across, r"$\mu$")
-    ankle = view(shape.stance_leg.ankle)
+    ankle, above = shape.stance_leg.ankle @ view, shape.stance_leg.axis_ends(0.0, _AXIS_ABOVE)[1]
     _line(axes, ankle, ankle + 0.8 * _UP, FAINT_INK, 0.8, "--")
     _draw_angle(axes, ankle, _UP, hips[1] - ankle, 0.7, "")
     _label(axes, ankle + 0.7 * _UP, "lean", (18, 0))
-    above = view(shape.stance_leg.ankle - _AXIS_ABOVE * shape.stance_leg.ankle_axis)
-    _draw_turn(axes, above, ankle - above)
+    _draw_turn(axes, above @ view, ankle - above @ view)
     width = 0.9 + parameters.hip_width
     _set_window(axes, contact - np.array([width - 0.4, 0.2]), width)
 
@@ -170,21 +155,14 @@ def _draw_top(axes: Axes, parameters: WalkerParameters) -> None:
     shape = walker_shape(parameters, pose)
     length = footprint_length(parameters.foot_radius)
     foot = np.zeros(2)
-    view = _View(np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
-    swing = view(shape.swing_leg.ankle)
-    for leg, place, alpha in ((shape.stance_leg, foot, 1.0), (shape.swing_leg, swing[::-1], 0.4)):
-        outline = footprint_outlines(place[None], np.array([_HEADING]), [leg.foot], length)[0]
-        axes.fill(
-            outline[:, 1],
-            outline[:, 0],
-            color=unit_colour(FOOT_COLOURS[leg.foot]),
-            alpha=alpha,
-            lw=0,
-        )
-    hips = view(np.array([shape.stance_leg.hip, shape.swing_leg.hip]))
-    _line(axes, hips[0], hips[1], mixed(INK, (255, 255, 255), 0.3), 2.5)
-    for hip in hips:
-        _draw_mass(axes, hip)
+    places = np.array([foot, shape.swing_leg.ankle[[0, 2]]])
+    feet: list[Foot] = [shape.stance_leg.foot, shape.swing_leg.foot]
+    outlines = footprint_outlines(places, np.full(2, _HEADING), feet, length)
+    for name, outline, alpha in zip(feet, outlines, (1.0, 0.4), strict=True):
+        axes.fill(*outline.T[::-1], color=unit_colour(FOOT_COLOURS[name]), alpha=alpha, lw=0)
+    hips = np.array([shape.stance_leg.hip, shape.swing_leg.hip])[:, [2, 0]]
+    _line(axes, hips[0], hips[1], _AXLE, 2.5)
+    _draw_masses(axes, *hips)
     heading = np.array([-math.sin(_HEADING), math.cos(_HEADING)])
     _draw_arrow(axes, foot, 0.75 * heading, FOOT_COLOURS[stance])
     _draw_arrow(axes, foot, 0.75 * _UP, FAINT_INK)
@@ -207,68 +185,42 @@ def _draw_floor(axes: Axes, contact: Vector, along: Vector, back: float, front: 
     _line(axes, edge[0], edge[1], INK, 1.0)
 
 
-def _draw_leg(axes: Axes, view: _View, leg: LegShape, fading: float) -> None:
-    white: Colour = (255, 255, 255)
-    colour = mixed(FOOT_COLOURS[leg.foot], white, fading)
+def _draw_leg(axes: Axes, view: Vector, leg: LegShape, fading: float) -> None:
+    colour = mixed(FOOT_COLOURS[leg.foot], _WHITE, fading)
+    pale = unit_colour(mixed(colour, _WHITE, 0.6))
     for arc in (leg.inner_arc, leg.outer_arc):
-        axes.fill(*view(arc).T, color=unit_colour(mixed(colour, white, 0.6)), lw=0)
-    sole = np.vstack([leg.inner_arc, leg.outer_arc[::-1]])
-    axes.fill(
-        *view(sole).T,
-        facecolor=unit_colour(mixed(colour, white, 0.6)),
-        edgecolor=unit_colour(colour),
-    )
-    _line(axes, view(leg.ankle), view(leg.hip), colour, 4.5)
-    ends = view(
-        np.array(
-            [leg.ankle - _AXIS_ABOVE * leg.ankle_axis, leg.ankle + _AXIS_BELOW * leg.ankle_axis]
-        )
-    )
-    _line(axes, ends[0], ends[1], mixed(ANKLE_AXIS, white, fading), 1.3, (0, (5, 2, 1, 2)))
+        axes.fill(*(arc @ view).T, color=pale, lw=0)
+    sole = np.vstack([leg.inner_arc, leg.outer_arc[::-1]]) @ view
+    axes.fill(*sole.T, facecolor=pale, edgecolor=unit_colour(colour))
+    _line(axes, leg.ankle @ view, leg.hip @ view, colour, 4.5)
+    below, above = leg.axis_ends(_AXIS_BELOW, _AXIS_ABOVE) @ view
+    _line(axes, above, below, mixed(ANKLE_AXIS, _WHITE, fading), 1.3, (0, (5, 2, 1, 2)))
 
 
 def _line(
     axes: Axes, start: Vector, end: Vector, colour: Colour, width: float, style: object = "-"
 ) -> None:
-    axes.plot(
-        [start[0], end[0]],
-        [start[1], end[1]],
-        color=unit_colour(colour),
-        linewidth=width,
-        linestyle=style,  # pyright: ignore[reportArgumentType]
-        solid_capstyle="round",
-    )
+    line: Any = {"linestyle": style, "linewidth": width, "solid_capstyle": "round"}
+    axes.plot(*np.array([start, end]).T, color=unit_colour(colour), **line)
 
 
-def _draw_mass(axes: Axes, place: Vector) -> None:
-    axes.plot(*place, marker="o", markersize=13, color=unit_colour(INK))
+def _draw_masses(axes: Axes, *places: Vector) -> None:
+    for place in places:
+        axes.plot(*place, marker="o", markersize=13, color=unit_colour(INK))
 
 
 def _label(
     axes: Axes, place: Vector, words: str, shift: tuple[float, float], colour: Colour = INK
 ) -> None:
     axes.annotate(
-        words,
-        tuple(place),
-        xytext=shift,
-        textcoords="offset points",
-        ha="center",
-        va="center",
-        color=unit_colour(colour),
-        fontsize=13 if words.startswith("$") else 10,
-        annotation_clip=False,
-    )
+        words, tuple(place), xytext=shift, textcoords="offset points", annotation_clip=False,
+        ha="center", va="center", color=unit_colour(colour), fontsize=13 if words.startswith("$") else 10,
+    )  # fmt: skip
 
 
 def _draw_angle(
-    axes: Axes,
-    corner: Vector,
-    first: Vector,
-    second: Vector,
-    radius: float,
-    words: str,
-    colour: Colour = INK,
-) -> None:
+    axes: Axes, corner: Vector, first: Vector, second: Vector, radius: float, words: str, colour: Colour = INK,
+) -> None:  # fmt: skip
     """An arc from one direction to another, the short way, with its name outside."""
     start = math.atan2(first[1], first[0])
     turn = math.remainder(math.atan2(second[1], second[0]) - start, 2.0 * math.pi)
@@ -296,22 +248,11 @@ def _draw_patch(axes: Axes, points: Vector, style: str, colour: Colour, width: f
     from matplotlib.patches import FancyArrowPatch
     from matplotlib.path import Path
 
-    axes.add_patch(
-        FancyArrowPatch(
-            path=Path(points),
-            arrowstyle=style,
-            color=unit_colour(colour),
-            fill=style == "-|>",
-            linewidth=width,
-            mutation_scale=11.0,
-            clip_on=False,
-        )
-    )
-
-
-def _draw_gravity(axes: Axes, place: Vector) -> None:
-    _draw_arrow(axes, place, -0.22 * _UP, COMMAND)
-    _label(axes, place - 0.11 * _UP, "$g$", (9, 0), COMMAND)
+    patch = FancyArrowPatch(
+        path=Path(points), arrowstyle=style, color=unit_colour(colour), fill=style == "-|>",
+        linewidth=width, mutation_scale=11.0, clip_on=False,
+    )  # fmt: skip
+    axes.add_patch(patch)
 
 
 def _draw_turn(axes: Axes, place: Vector, along: Vector) -> None:

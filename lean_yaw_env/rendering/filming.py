@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import itertools
-import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,38 +15,17 @@ from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.files import require_ending, written_whole
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector
 from lean_yaw_env.rendering.geometry import Pose
+from lean_yaw_env.rendering.motion import SECONDS_PER_TIME_UNIT, SWING_SHARE, StepMotion
 from lean_yaw_env.rendering.pygame_renderer import SIZE, Renderer
 from lean_yaw_env.rendering.scene import Scene, status_lines
 from lean_yaw_env.validation import require_number
 from lean_yaw_env.walker import Walk, Walker
 
-SECONDS_PER_TIME_UNIT = 1.0 / math.sqrt(9.81)
-"""sqrt(leg length / gravity) for legs of one metre on earth: the film runs in real time."""
-SWING_SHARE = 0.5
-"""Share of a step in which the swing leg is drawn on its way; the model has it in front at once."""
 HOLD_SECONDS = 1.0
 """How long a film stays with a walker that has fallen."""
-_SAMPLES = 33  # per step; straight lines between them are wrong by less than 1e-4 leg lengths
-_COORDINATES = ("stance_pitch", "ankle_angle", "mass_offset")
 
 Frame = NDArray[np.uint8]
 Encoder = Callable[[Path, Iterable[Frame], float], None]
-
-
-@dataclass(frozen=True, eq=False)
-class _Recording:
-    """A walk with the motion within its steps, the unfinished one of a fall included.
-
-    ``ends`` are the steps' ends in time; ``coordinates`` has shape (steps, samples, 3), ``path``
-    shape (steps, samples, 2).
-    """
-
-    walk: Walk
-    angles: Vector
-    commanded: Vector | None
-    ends: Vector
-    coordinates: Vector
-    path: Vector
 
 
 def film(
@@ -83,16 +60,11 @@ def film(
     seconds_per_time_unit : (0, 100]
         Of the film; by default real time for legs of one metre.
     swing_share : [0, 1]
-        Share of a step in which the swing leg is drawn on its way to the front. The model has it
-        there at once: massless, it acts on nothing.
+        See ``StepMotion``.
     size : (width, height)
         Pixels.
     progress : bool
         Show a progress bar.
-
-    Returns
-    -------
-    Walk
 
     Raises
     ------
@@ -106,31 +78,9 @@ def film(
     require_number("seconds_per_time_unit", seconds_per_time_unit, 0.0, 100.0, "(]")
     require_number("swing_share", swing_share, 0.0, 1.0)
     renderer = Renderer(size)
-    walk = walker.walk(
-        n_steps,
-        state=state,
-        stance=stance,
-        inter_leg_angle=inter_leg_angle,
-        mass_offset=mass_offset,
-        previous_offset=previous_offset,
-    )
-    recording = _record(walker, walk, n_steps, inter_leg_angle, mass_offset, commanded_heading)
-    times = np.arange(0.0, recording.ends[-1], 1.0 / (file.rate * seconds_per_time_unit))
-    frames = (renderer.frame(_scene(walker, recording, time, swing_share)) for time in times)
-    file.write(frames, len(times), holds_last=walk.fall is not None, progress=progress)
-    return walk
-
-
-def _record(
-    walker: Walker,
-    walk: Walk,
-    n_steps: int,
-    inter_leg_angle: float | Sequence[float] | Vector,
-    mass_offset: float | Sequence[float] | Vector,
-    commanded_heading: float | Sequence[float] | Vector | None,
-) -> _Recording:
-    angles = np.broadcast_to(np.asarray(inter_leg_angle, dtype=float), n_steps)
-    offsets = np.broadcast_to(np.asarray(mass_offset, dtype=float), n_steps)
+    command: dict[str, Any] = {"inter_leg_angle": inter_leg_angle, "mass_offset": mass_offset}
+    start: dict[str, Any] = {"state": state, "stance": stance, "previous_offset": previous_offset}
+    walk = walker.walk(n_steps, **start, **command)
     commanded = None
     if commanded_heading is not None:
         commanded = np.asarray(commanded_heading, dtype=float)
@@ -139,89 +89,59 @@ def _record(
                 f"commanded_heading must be one number or {n_steps}, got shape {commanded.shape}"
             )
         commanded = np.broadcast_to(commanded, n_steps)
-    durations = walk.durations.tolist()
-    if walk.fall is not None:
-        i = walk.n_steps
-        last = walker.step(walk.states[i], **_command(walk, i, angles, offsets))
-        durations.append(max(last.duration, 1e-6))  # a fall at the start of a step lasts no time
-    coordinates, path = [], []
-    for i, duration in enumerate(durations):
-        motion = walker.stance_motion(
-            walk.states[i],
-            duration=duration,
-            samples=_SAMPLES,
-            **_command(walk, i, angles, offsets),
-        )
-        coordinates.append(np.column_stack([motion[name] for name in _COORDINATES]))
-        cosine, sine = math.cos(walk.headings[i]), math.sin(walk.headings[i])
-        ahead, right = motion["centre_x"], motion["centre_z"]
-        path.append(
-            walk.footprints[i]
-            + np.column_stack([cosine * ahead + sine * right, cosine * right - sine * ahead])
-        )
-    return _Recording(
-        walk, angles, commanded, np.cumsum(durations), np.array(coordinates), np.array(path)
-    )
+    motions = _motions(walker, walk, swing_share)
+    ends = np.cumsum([motion.duration for motion in motions])
+    times = np.arange(0.0, ends[-1], 1.0 / (file.rate * seconds_per_time_unit))
+    frames = (renderer.frame(_scene(walk, motions, ends, commanded, time)) for time in times)
+    file.write(frames, len(times), holds_last=walk.fall is not None, progress=progress)
+    return walk
 
 
-def _command(walk: Walk, i: int, angles: Vector, offsets: Vector) -> dict[str, Any]:
-    return {
-        "stance": walk.stances[i],
-        "inter_leg_angle": float(angles[i]),
-        "mass_offset": float(offsets[i]),
-        "previous_offset": float(walk.mass_offsets[i]),
-    }
+def _motions(walker: Walker, walk: Walk, swing_share: float) -> list[StepMotion]:
+    """The motion within each step, the unfinished one of a fall included."""
+    motions: list[StepMotion] = []
+    for i, (angle, offset) in enumerate(walk.commands.tolist()):
+        state, foot, before = walk.states[i], walk.stances[i], float(walk.mass_offsets[i])
+        command = {"inter_leg_angle": angle, "mass_offset": offset}
+        if i < walk.n_steps:
+            duration = float(walk.durations[i])
+        else:
+            duration = walker.step(state, stance=foot, previous_offset=before, **command).duration
+        comes_from = -walk.commands[i - 1, 0] if i else angle  # at first it is in front
+        pose = Pose(state, foot, comes_from, before, walk.footprints[i])
+        motion = StepMotion(walker, pose, duration=duration, swing_share=swing_share, **command)
+        motions.append(motion)
+    return motions
 
 
-def _scene(walker: Walker, recording: _Recording, time: float, swing_share: float) -> Scene:
-    walk, ends = recording.walk, recording.ends
+def _scene(
+    walk: Walk, motions: list[StepMotion], ends: Vector, commanded: Vector | None, time: float
+) -> Scene:
     i = min(int(np.searchsorted(ends, time, side="right")), len(ends) - 1)
     start = ends[i - 1] if i else 0.0
     share = (time - start) / (ends[i] - start)
-    place = share * (_SAMPLES - 1)
-    grid = np.arange(_SAMPLES)
-    pitch, ankle, offset = (np.interp(place, grid, column) for column in recording.coordinates[i].T)
-    pose = Pose(
-        state=np.array([walk.headings[i], pitch, ankle, 0.0, 0.0]),
-        stance=walk.stances[i],
-        inter_leg_angle=swing_angle(recording.angles, i, share, swing_share),
-        mass_offset=float(offset),
-        contact=walk.footprints[i],
-    )
     seen = slice(0, i + 1)
-    commanded = None if recording.commanded is None else float(recording.commanded[i])
-    recent = walk.footprints[max(i - 2, 0)], walk.durations[max(i - 2, 0) : i].sum()
-    fallen = walk.fall is not None and i == walk.n_steps
+    command = None if commanded is None else float(commanded[i])
+    recent = max(i - 2, 0)
+    way, duration = walk.footprints[i] - walk.footprints[recent], walk.durations[recent:i].sum()
+    fall = walk.fall if i == walk.n_steps else None
     return Scene(
-        parameters=walker.parameters,
-        pose=pose,
+        parameters=walk.parameters,
+        pose=motions[i].pose(share),
         footprints=walk.footprints[seen],
         headings=walk.headings[seen],
         feet=walk.stances[seen],
-        path=np.vstack(
-            [recording.path[:i].reshape(-1, 2), recording.path[i, : math.floor(place) + 1]]
-        ),
-        commanded_heading=commanded,
+        path=np.vstack([*(motion.path() for motion in motions[:i]), motions[i].path(share)]),
+        commanded_heading=command,
         lines=status_lines(
             step=i,
             time=time,
-            speed=float(np.linalg.norm(walk.footprints[i] - recent[0]) / recent[1])
-            if i >= 2
-            else None,
+            speed=float(np.linalg.norm(way) / duration) if i >= 2 else None,
             heading=float(walk.headings[max(i - 1, 0) : i + 1].mean()),
-            commanded_heading=commanded,
-            status=f"falls: {walk.fall.value}" if fallen and walk.fall else "walking",
+            commanded_heading=command,
+            status=f"falls: {fall.value}" if fall else "walking",
         ),
     )
-
-
-def swing_angle(angles: Vector, i: int, share: float, swing_share: float) -> float:
-    """The inter-leg angle as drawn: from where the old stance leg was left to the front."""
-    if i == 0 or share >= swing_share:
-        return float(angles[i])
-    s = share / swing_share
-    blend = s * s * s * (10.0 + s * (6.0 * s - 15.0))
-    return float(-angles[i - 1] + blend * (angles[i] + angles[i - 1]))
 
 
 class FilmFile:

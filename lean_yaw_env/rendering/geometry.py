@@ -1,9 +1,7 @@
-"""From a walker's coordinates to its shape in space: hips, masses, legs, tilted ankle axes and
-cylinder feet.
+"""From a walker's coordinates to its shape in space: hips, masses, legs, tilted ankle axes and cylinder feet.
 
-The floor frame has x straight downhill, y along the floor's normal and z to the right of someone
-facing downhill; lengths are in leg lengths. Plain numpy, and on purpose not the kernels' formulas:
-these go by rotation matrices, so that pictures and kernels check each other.
+The floor frame has x straight downhill, y along the floor's normal and z to the right of someone facing downhill; lengths are in leg lengths.
+These are not the kernels' formulas: they go by rotation matrices, so that pictures and kernels check each other.
 """
 
 from __future__ import annotations
@@ -67,11 +65,15 @@ class Pose:
 
     def __post_init__(self) -> None:
         angle = require_number("inter_leg_angle", self.inter_leg_angle, -QUARTER_TURN, QUARTER_TURN)
-        object.__setattr__(self, "state", require_array("state", self.state, (STATE_SIZE,)))
-        object.__setattr__(self, "stance", require_foot(self.stance))
-        object.__setattr__(self, "inter_leg_angle", angle)
-        object.__setattr__(self, "mass_offset", require_mass_offset(self.mass_offset))
-        object.__setattr__(self, "contact", require_array("contact", self.contact, (2,)))
+        checked = {
+            "state": require_array("state", self.state, (STATE_SIZE,)),
+            "stance": require_foot(self.stance),
+            "inter_leg_angle": angle,
+            "mass_offset": require_mass_offset(self.mass_offset),
+            "contact": require_array("contact", self.contact, (2,)),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +87,10 @@ class LegShape:
         The leg's ends; the ankle is on the sole, a leg length from the hip.
     ankle_axis : shape (3,)
         Unit vector along the ankle axis, forward and down from the ankle.
-    centre : shape (3,)
-        On the cylinder's axis.
+    centre : shape (3,), on the cylinder's axis
     rotation : shape (3, 3)
         The foot's axes as columns: forward along the untilted sole, up, and the cylinder's axis.
-    inner_arc, outer_arc : shape (k, 3)
-        The sole's two edges, from heel to toe.
+    inner_arc, outer_arc : shape (k, 3), the sole's two edges, from heel to toe
     """
 
     foot: Foot
@@ -115,8 +115,13 @@ class LegShape:
     @property
     def clearance(self) -> float:
         """Height of the cylinder's lowest line above the floor."""
-        radius = float(np.linalg.norm(self.centre - self.ankle))
-        return float(self.centre[1]) - radius
+        return float(self.centre[1] - np.linalg.norm(self.centre - self.ankle))
+
+    def axis_ends(self, below: float, above: float) -> Vector:
+        """Places on the ankle axis, in front of and below the ankle and on the other side; shape (2, 3)."""
+        return np.array(
+            [self.ankle + below * self.ankle_axis, self.ankle - above * self.ankle_axis]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,10 +131,8 @@ class WalkerShape:
     Attributes
     ----------
     stance_leg, swing_leg : LegShape
-    axle : shape (3,)
-        Unit vector along the hip axle, to the right.
-    masses : shape (2, 3)
-        The left and the right hip mass.
+    axle : shape (3,), unit vector along the hip axle, to the right
+    masses : shape (2, 3), the left and the right hip mass
     contact : shape (3,)
         Where the stance foot touches the floor now; it rolls away from the reference point.
     """
@@ -165,9 +168,8 @@ def walker_shape(parameters: WalkerParameters, pose: Pose) -> WalkerShape:
 
     Notes
     -----
-    Foot frame F = Ry(heading) Rz(pitch); the cylinder's centre rolls to C = P0 - r pitch h + r n;
-    the ankle is on the sole at A = C + F (0, -r, 0); the leg's frame is L = F Ra(ankle angle), the
-    hip a leg length along its second axis, the axle its third. The swing leg is turned by the
+    Foot frame F = Ry(heading) Rz(pitch); the cylinder's centre rolls to C = P0 - r pitch h + r n; the ankle is on the sole at A = C + F (0, -r, 0);
+    the leg's frame is L = F Ra(ankle angle), the hip a leg length along its second axis, the axle its third. The swing leg is turned by the
     inter-leg angle about the axle, and its ankle keeps the cylinder's axis horizontal.
     """
     heading, pitch, ankle_angle = (float(value) for value in pose.state[:3])
@@ -188,26 +190,19 @@ def walker_shape(parameters: WalkerParameters, pose: Pose) -> WalkerShape:
     other_hip = hip + SIDE[pose.stance] * parameters.hip_width * axle
     swing = leg @ rotation((0.0, 0.0, 1.0), pose.inter_leg_angle)
     swing_foot = swing @ rotation(ankle_axis, -_flat_ankle_angle(swing, ankle_axis))
-    swing_leg = _leg_shape(
-        OTHER_FOOT[pose.stance],
-        other_hip,
-        other_hip - swing[:, 1],
-        swing @ ankle_axis,
-        swing_foot,
-        radius,
-    )
+    other_ankle, other_axis = other_hip - swing[:, 1], swing @ ankle_axis
+    other = OTHER_FOOT[pose.stance]
+    swing_leg = _leg_shape(other, other_hip, other_ankle, other_axis, swing_foot, radius)
     left, right = (hip, other_hip) if pose.stance == "left" else (other_hip, hip)
     masses = np.array([left, right]) + pose.mass_offset * axle
     return WalkerShape(stance_leg, swing_leg, axle, masses, contact)
 
 
 def _flat_ankle_angle(leg: Vector, ankle_axis: Vector) -> float:
-    """The ankle angle, less than a quarter turn, that makes a foot's cylinder axis horizontal under
-    a leg of this frame.
+    """The ankle angle, less than a quarter turn, that makes a foot's cylinder axis horizontal under a leg of this frame.
 
-    The cylinder's axis is e3 cos(b) + e1 sin(b), with e1 square to the ankle axis and to the axle.
-    A leg so far back that its ankle axis is past the vertical has no such angle; its foot is drawn
-    square to it.
+    The cylinder's axis is e3 cos(b) + e1 sin(b), with e1 square to the ankle axis and to the axle. A leg so far back that its ankle axis is past
+    the vertical has no such angle; its foot is drawn square to it.
     """
     e1 = leg @ np.array([-ankle_axis[1], ankle_axis[0], 0.0])
     if e1[1] < _LEAST_UPRIGHT:

@@ -48,14 +48,13 @@ def draw_footprints(
     foot_radius: float = 0.5,
     places: ArrayLike = (),
 ) -> None:
-    """Draw footprints and the centre of mass's path from above, one walk to an axes, all to one
-    scale; downhill is up.
+    """Draw footprints and the centre of mass's path from above, one walk to an axes, all to one scale; downhill is up.
 
     Parameters
     ----------
     walks : mapping of names to walks
-        With ``footprints`` (n, 2), ``headings`` (n,), ``stances`` (n) and ``path`` (m, 4) (time,
-        downhill, up, right) as ``Walk`` has them; the path may be empty.
+        With ``footprints`` (n, 2), ``headings`` (n,), ``stances`` (n) and ``path`` (m, 4) (time, downhill, up, right) as ``Walk`` has them; the
+        path may be empty.
     axes : one for each walk
     foot_radius : [0, 1)
         Gives the prints' length.
@@ -150,10 +149,9 @@ def _draw_walk(axes: Axes, walk: WalkRecord, length: float) -> None:
     outlines = footprint_outlines(walk.footprints, walk.headings, walk.stances, length)
     colours = [unit_colour(FOOT_COLOURS[foot]) for foot in walk.stances]
     # an edge of its own colour keeps prints visible where they are smaller than a dot
-    axes.add_collection(
-        PolyCollection(
-            list(outlines[:, :, ::-1]), facecolors=colours, edgecolors=colours, linewidths=0.4
-        )
+    prints = PolyCollection(
+        list(outlines[:, :, ::-1]), facecolors=colours, edgecolors=colours, linewidths=0.4
     )
+    axes.add_collection(prints)
     if len(walk.path):
         axes.plot(walk.path[:, 3], walk.path[:, 1], color=unit_colour(INK), linewidth=0.7)

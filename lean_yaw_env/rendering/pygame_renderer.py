@@ -48,7 +48,7 @@ class Renderer:
         with needs_extra("render"):
             import pygame
         self._pygame: Any = pygame
-        self._canvas = Canvas(*self.size, BACKGROUND)
+        self._canvas = Canvas(self.size, BACKGROUND)
         self._window: Any = None
         self._clock: Any = None
         self._closed_by_user = False
@@ -61,11 +61,7 @@ class Renderer:
     def show(self, scene: Scene, fps: float = 30.0) -> bool:
         """Show a scene in a window, waiting as long as the frame rate asks.
 
-        Returns
-        -------
-        bool
-            False once the window has been closed by its user; it stays closed, and nothing more is
-            drawn.
+        Returns False once its user has closed the window; it stays closed, and nothing more is drawn.
 
         Raises
         ------

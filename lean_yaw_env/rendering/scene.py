@@ -23,10 +23,6 @@ class Goal(NamedTuple):
     reached: bool = False
 
 
-def _no_points() -> Vector:
-    return np.empty((0, 2))
-
-
 @dataclass(frozen=True, eq=False)
 class Scene:
     """A walker on its slope at one instant, with the walk behind it and what it is asked to do.
@@ -36,12 +32,8 @@ class Scene:
     parameters : WalkerParameters
     pose : Pose
         The walker now.
-    footprints : shape (n, 2)
-        Contact reference points so far, (downhill, right), in leg lengths; the last is the stance
-        foot's.
-    headings : shape (n,)
-        Of each footprint, rad.
-    feet : n of "left" or "right"
+    footprints, headings, feet : shapes (n, 2) and (n,), and n of "left" or "right"
+        Contact reference points so far, (downhill, right), in leg lengths, the last the stance foot's; heading of each, rad.
     path : shape (m, 2)
         The centre of mass so far, (downhill, right).
     commanded_heading : float, optional
@@ -55,16 +47,15 @@ class Scene:
     Raises
     ------
     ValueError
-        If an array has another shape or holds what is not a finite number, or a foot or goal is
-        none.
+        If an array has another shape or holds what is not a finite number, or a foot or goal is none.
     """
 
     parameters: WalkerParameters
     pose: Pose
-    footprints: Vector = field(default_factory=_no_points)
+    footprints: Vector = field(default_factory=lambda: np.empty((0, 2)))
     headings: Vector = field(default_factory=lambda: np.empty(0))
     feet: Sequence[Foot] = ()
-    path: Vector = field(default_factory=_no_points)
+    path: Vector = field(default_factory=lambda: np.empty((0, 2)))
     commanded_heading: float | None = None
     goals: Sequence[Goal] = ()
     reference_path: Vector | None = None
@@ -82,25 +73,27 @@ class Scene:
             raise ValueError(
                 f"feet must hold {len(footprints)}, one per footprint, got {len(feet)}"
             )
-        object.__setattr__(self, "footprints", footprints)
-        object.__setattr__(self, "headings", headings)
-        object.__setattr__(self, "feet", feet)
-        object.__setattr__(self, "path", require_array("path", self.path, (None, 2)))
-        object.__setattr__(self, "goals", tuple(_require_goal(goal) for goal in self.goals))
-        object.__setattr__(self, "lines", tuple(str(line) for line in self.lines))
-        if self.commanded_heading is not None:
-            heading = require_finite("commanded_heading", self.commanded_heading)
-            object.__setattr__(self, "commanded_heading", heading)
-        if self.reference_path is not None:
-            line = require_array("reference_path", self.reference_path, (None, 2))
-            object.__setattr__(self, "reference_path", line)
+        heading, line = self.commanded_heading, self.reference_path
+        checked = {
+            "footprints": footprints,
+            "headings": headings,
+            "feet": feet,
+            "path": require_array("path", self.path, (None, 2)),
+            "goals": tuple(_require_goal(goal) for goal in self.goals),
+            "lines": tuple(str(line) for line in self.lines),
+            "commanded_heading": None
+            if heading is None
+            else require_finite("commanded_heading", heading),
+            "reference_path": None
+            if line is None
+            else require_array("reference_path", line, (None, 2)),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
 
     @property
     def heading(self) -> float:
-        """Mean heading of the last two footprints, for left and right alternate, rad.
-
-        The stance foot's if there are not two.
-        """
+        """Mean heading of the last two footprints, for left and right alternate, rad; the stance foot's if there are not two."""
         if len(self.headings) < 2:
             return float(self.pose.state[0])
         return float(self.headings[-2:].mean())

@@ -63,14 +63,8 @@ def draw_top_view(canvas: Canvas, panel: Panel, scene: Scene, shape: WalkerShape
 
 def _camera(panel: Panel, scene: Scene, walker: Vector) -> FloorCamera:
     goals = np.array([[goal.downhill, goal.right] for goal in scene.goals]).reshape(-1, 2)
-    return floor_camera(
-        panel,
-        np.vstack([scene.path, goals]),
-        walker,
-        border=BORDER,
-        least_scale=LEAST_SCALE,
-        greatest_scale=GREATEST_SCALE,
-    )
+    scales = {"least_scale": LEAST_SCALE, "greatest_scale": GREATEST_SCALE}
+    return floor_camera(panel, np.vstack([scene.path, goals]), walker, border=BORDER, **scales)
 
 
 def _draw_grid(canvas: Canvas, camera: FloorCamera) -> None:
@@ -126,9 +120,8 @@ def _draw_walker(canvas: Canvas, camera: FloorCamera, scene: Scene, shape: Walke
     length = footprint_length(scene.parameters.foot_radius)
     # the print it would leave were it set down as it is: around where its sole is at zero pitch
     ahead = scene.parameters.foot_radius * leg.pitch
-    reference = leg.centre[[0, 2]] + ahead * np.array(
-        [math.cos(leg.heading), -math.sin(leg.heading)]
-    )
+    forward = np.array([math.cos(leg.heading), -math.sin(leg.heading)])
+    reference = leg.centre[[0, 2]] + ahead * forward
     outline = footprint_outlines(reference[None], np.array([leg.heading]), [leg.foot], length)[0]
     canvas.polygon(camera.pixels(outline), None, FOOT_COLOURS[leg.foot], 1.0)
     hips = camera.pixels(np.array([shape.stance_leg.hip, leg.hip, *shape.masses])[:, [0, 2]])
@@ -176,9 +169,8 @@ def _draw_downhill(canvas: Canvas, camera: FloorCamera, scene: Scene) -> None:
         length = np.array([0.0, -26.0])
         ends = (tail, tail + length) if slope > 0.0 else (tail + length, tail)
         canvas.arrow(*ends, FAINT_INK, 2.0)
-    canvas.text(
-        words, (panel.left + 34.0, panel.bottom - 16.0), FAINT_INK, anchor=(0.0, 1.0), ground=FLOOR
-    )
+    place = (panel.left + 34.0, panel.bottom - 16.0)
+    canvas.text(words, place, FAINT_INK, anchor=(0.0, 1.0), ground=FLOOR)
 
 
 def _draw_words(canvas: Canvas, camera: FloorCamera, scene: Scene, walker: Vector) -> None:
@@ -193,10 +185,7 @@ def _draw_words(canvas: Canvas, camera: FloorCamera, scene: Scene, walker: Vecto
 
 
 def _draw_inset(canvas: Canvas, camera: FloorCamera, scene: Scene, walker: Vector) -> None:
-    """The whole path, small, when the panel cannot show it.
-
-    In the lower right corner, or in the upper one if the walker is down there.
-    """
+    """The whole path, small, in the lower right corner, or in the upper one if the walker is down there."""
     size = 110.0
     place = camera.pixels(walker) - camera.panel.middle
     top = camera.panel.top + 14.0 if (place > 0.0).all() else camera.panel.bottom - size - 48.0
@@ -211,10 +200,7 @@ def _draw_inset(canvas: Canvas, camera: FloorCamera, scene: Scene, walker: Vecto
 
 
 def _thinned(points: Vector) -> Vector:
-    """About so many of the points, the last among them.
-
-    The stride is a power of two, so that the points chosen stay chosen as a path grows.
-    """
+    """About so many of the points, the last among them. The stride is a power of two, so that the points chosen stay chosen as a path grows."""
     stride = 1
     while len(points) > stride * _MOST_PATH_POINTS:
         stride *= 2

@@ -1,9 +1,8 @@
 """The bicycle: lean and yaw coupled dynamically, through a steering fork of its own.
 
-Section 2.2 of Wisse and Schwab, "Skateboards, Bicycles, and Three-dimensional Biped Walking
-Machines: Velocity-dependent Stability by Means of Lean-to-yaw Coupling" (2005), eqs. (4), (5) and
-Figure 4: an uncontrolled bicycle with a rigid rider, linearised about upright straight motion.
-SI units; coordinates q = (lean of the rear frame, steer), rad.
+Section 2.2 of Wisse and Schwab, "Skateboards, Bicycles, and Three-dimensional Biped Walking Machines: Velocity-dependent Stability by Means
+of Lean-to-yaw Coupling" (2005), eqs. (4), (5) and Figure 4: an uncontrolled bicycle with a rigid rider, linearised about upright straight
+motion. SI units; coordinates q = (lean of the rear frame, steer), rad.
 """
 
 from __future__ import annotations
@@ -23,8 +22,13 @@ from lean_yaw_env.vehicles.bicycle_parameters import (
     canonical_matrices,
 )
 from lean_yaw_env.vehicles.characteristic import CharacteristicPolynomial, DoubleRoot
-from lean_yaw_env.vehicles.linear_motion import ComplexArray, FloatArray, linear_motion
-from lean_yaw_env.vehicles.stability import SpeedRange, stable_speed_range
+from lean_yaw_env.vehicles.stability import (
+    ComplexArray,
+    FloatArray,
+    SpeedRange,
+    linear_motion,
+    stable_speed_range,
+)
 
 _ROUND_OFF = 1e-9
 """Real part, relative to the greatest eigenvalue, below which a mode counts as not growing."""
@@ -32,18 +36,13 @@ _ROUND_OFF = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class BicycleMotion:
-    """A time history of the uncontrolled bicycle; every field has shape (n,)."""
+    """A time history of the uncontrolled bicycle; every field has shape (n,), in s, rad and rad / s."""
 
     times: FloatArray
-    """s."""
     lean: FloatArray
-    """rad."""
     steer: FloatArray
-    """rad."""
     lean_rate: FloatArray
-    """rad / s."""
     steer_rate: FloatArray
-    """rad / s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,20 +51,15 @@ class LinearBicycle:
 
     Parameters
     ----------
-    mass_matrix : shape (2, 2)
-        M, kg m^2. Symmetric and positive definite.
-    damping_matrix : shape (2, 2)
-        C1, kg m. Multiplied by the speed.
-    static_stiffness : shape (2, 2)
-        K0, N m / rad. Gravity's value is already in it, as in eq. (5).
-    dynamic_stiffness : shape (2, 2)
-        K2, kg. Multiplied by the speed squared.
+    mass_matrix, damping_matrix : shape (2, 2)
+        M, kg m^2, symmetric and positive definite; C1, kg m, multiplied by the speed.
+    static_stiffness, dynamic_stiffness : shape (2, 2)
+        K0, N m / rad, with gravity's value already in it as in eq. (5); K2, kg, multiplied by the speed squared.
 
     Raises
     ------
     ValueError
-        If a matrix has another shape or a value that is not finite, or the mass matrix is not
-        symmetric and positive definite.
+        If a matrix has another shape or a value that is not finite, or the mass matrix is not symmetric and positive definite.
     """
 
     mass_matrix: FloatArray
@@ -74,8 +68,7 @@ class LinearBicycle:
     dynamic_stiffness: FloatArray
 
     def __post_init__(self) -> None:
-        names = ("mass_matrix", "damping_matrix", "static_stiffness", "dynamic_stiffness")
-        for name in names:
+        for name in ("mass_matrix", "damping_matrix", "static_stiffness", "dynamic_stiffness"):
             matrix = require_array(name, getattr(self, name), (2, 2))
             matrix.setflags(write=False)
             object.__setattr__(self, name, matrix)
@@ -93,16 +86,9 @@ class LinearBicycle:
         )
 
     def state_matrix(self, speeds: ArrayLike) -> FloatArray:
-        """A of x' = A x, x = (lean, steer, lean rate, steer rate), at each speed.
+        """A of x' = A x, x = (lean, steer, lean rate, steer rate), at each speed; shape (n, 4, 4).
 
-        Parameters
-        ----------
-        speeds : a number or shape (n,)
-            m / s; negative rolls backwards.
-
-        Returns
-        -------
-        shape (n, 4, 4)
+        ``speeds`` is a number or has shape (n,), m / s; negative rolls backwards.
 
         Raises
         ------
@@ -118,42 +104,22 @@ class LinearBicycle:
         return matrix
 
     def eigenvalues(self, speeds: ArrayLike) -> ComplexArray:
-        """Eigenvalues at each speed, in no order that follows a mode from speed to speed.
+        """Eigenvalues at each speed, 1/s, by falling real part, then falling imaginary part; shape (n, 4).
 
-        Parameters
-        ----------
-        speeds : a number or shape (n,)
-            m / s; negative rolls backwards.
-
-        Returns
-        -------
-        shape (n, 4)
-            In 1/s, by falling real part, then falling imaginary part. ``follow_eigenvalues`` sorts
-            them by mode.
-
-        Raises
-        ------
-        ValueError
-            If a speed is not finite.
+        ``follow_eigenvalues`` sorts them by mode. Arguments and errors as for ``state_matrix``.
         """
         values = np.linalg.eigvals(self.state_matrix(speeds))
         return np.sort_complex(values.astype(np.complex128))[:, ::-1]
 
     def modes(self, speed: float) -> tuple[ComplexArray, ComplexArray]:
-        """Eigenvalues at one speed with their shapes.
-
-        Parameters
-        ----------
-        speed : float
-            m / s.
+        """Eigenvalues at one speed, m / s, with their shapes.
 
         Returns
         -------
         eigenvalues : shape (4,)
             1/s, in no particular order.
         shapes : shape (4, 2)
-            Row i is (lean, steer) of mode i, of unit length, lean real and not negative: the
-            steer is then seen relative to the lean.
+            Row i is (lean, steer) of mode i, of unit length, lean real and not negative: the steer is then seen relative to the lean.
 
         Raises
         ------
@@ -173,18 +139,12 @@ class LinearBicycle:
         return self.characteristic.double_roots()
 
     def double_root_speed(self) -> float | None:
-        """Lowest positive speed, m / s, at which two real eigenvalues meet; None if there is none.
-
-        There the oscillatory weave mode emerges: 0.7 m/s in the paper.
-        """
+        """Lowest positive speed, m / s, at which two real eigenvalues meet and the weave emerges, 0.7 m/s in the paper; or None."""
         roots = self.double_roots()
         return roots[0].speed if roots else None
 
     def weave_speed(self) -> float | None:
-        """Lowest speed, m / s, at which a growing oscillation becomes a decaying one, or None.
-
-        4.3 m/s in the paper.
-        """
+        """Lowest speed, m / s, at which a growing oscillation becomes a decaying one, 4.3 m/s in the paper; or None."""
         polynomial = self.characteristic
         for speed, frequency in polynomial.imaginary_pairs():
             if polynomial.eigenvalue_rate(speed, 1j * frequency).real < 0.0:
@@ -192,10 +152,7 @@ class LinearBicycle:
         return None
 
     def capsize_speed(self) -> float | None:
-        """Lowest speed, m / s, at which a real eigenvalue rises through zero, or None.
-
-        6.1 m/s in the paper.
-        """
+        """Lowest speed, m / s, at which a real eigenvalue rises through zero, 6.1 m/s in the paper; or None."""
         polynomial = self.characteristic
         for speed in polynomial.zero_eigenvalue_speeds():
             if polynomial.eigenvalue_rate(speed, 0.0).real > 0.0:
@@ -205,8 +162,8 @@ class LinearBicycle:
     def stable_speed_range(self) -> SpeedRange | None:
         """Lowest range of positive speeds at which no mode grows, m / s, or None.
 
-        An eigenvalue can cross the imaginary axis only at zero or as an imaginary pair. The speeds
-        of both are known exactly, and between two of them one look at the eigenvalues decides.
+        An eigenvalue can cross the imaginary axis only at zero or as an imaginary pair. The speeds of both are known exactly, and between two
+        of them one look at the eigenvalues decides.
         """
         polynomial = self.characteristic
         pair_speeds = [speed for speed, _ in polynomial.imaginary_pairs()]
@@ -222,7 +179,7 @@ class LinearBicycle:
         return None if lower is None else SpeedRange(lower, math.inf)
 
     def _has_no_growth(self, speed: float) -> bool:
-        values = self.eigenvalues(speed)[0]
+        values = self.eigenvalues(speed)
         return bool(np.max(values.real) <= _ROUND_OFF * np.max(np.abs(values)))
 
     def motion(
@@ -235,16 +192,9 @@ class LinearBicycle:
         lean_rate: float = 0.0,
         steer_rate: float = 0.0,
     ) -> BicycleMotion:
-        """Motion of the uncontrolled bicycle, exact but for round-off.
+        """Motion of the uncontrolled bicycle from a lean and a steer (rad) and their rates (rad / s), exact but for round-off.
 
-        Parameters
-        ----------
-        speed : float
-            m / s.
-        times : a number or shape (n,)
-            s after the start.
-        lean, steer, lean_rate, steer_rate : float
-            At time 0, rad and rad / s.
+        ``speed`` is in m / s; ``times`` is a number or has shape (n,), s after the start.
 
         Raises
         ------
@@ -260,16 +210,11 @@ class LinearBicycle:
         return BicycleMotion(samples, *linear_motion(matrix, state, samples).T)
 
 
-@stable_speed_range.register
-def _bicycle_range(vehicle: LinearBicycle) -> SpeedRange | None:
-    return vehicle.stable_speed_range()
+stable_speed_range.register(LinearBicycle, LinearBicycle.stable_speed_range)
 
 
 def paper_bicycle() -> LinearBicycle:
-    """The paper's bicycle, eq. (5) as printed, to five digits.
-
-    ``benchmark_bicycle(parameters_2005())`` is the same bicycle to all digits.
-    """
+    """The paper's bicycle, eq. (5) as printed, to five digits; to all digits it is ``benchmark_bicycle(parameters_2005())``."""
     return LinearBicycle(
         mass_matrix=np.array([[80.812, 2.3234], [2.3234, 0.30127]]),
         damping_matrix=np.array([[0.0, 33.774], [-0.84823, 1.7070]]),
@@ -280,10 +225,6 @@ def paper_bicycle() -> LinearBicycle:
 
 def benchmark_bicycle(parameters: BicycleParameters = BENCHMARK_2007) -> LinearBicycle:
     """The linear bicycle of given masses and lengths, by default the 2007 benchmark.
-
-    Parameters
-    ----------
-    parameters : BicycleParameters
 
     Raises
     ------

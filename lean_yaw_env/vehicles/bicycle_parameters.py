@@ -1,9 +1,8 @@
 """Linear bicycle matrices from masses and lengths.
 
-The algorithm and the benchmark are those of J. P. Meijaard, J. M. Papadopoulos, A. Ruina and
-A. L. Schwab, "Linearized dynamics equations for the balance and steer of a bicycle: a benchmark
-and review", Proc. R. Soc. A 463 (2007) 1955-1982, appendix A. SI units. Axes: origin at the rear
-contact point, x forward, y to the right, z down, so that heights are negative z.
+The algorithm and the benchmark are those of J. P. Meijaard, J. M. Papadopoulos, A. Ruina and A. L. Schwab, "Linearized dynamics equations
+for the balance and steer of a bicycle: a benchmark and review", Proc. R. Soc. A 463 (2007) 1955-1982, appendix A. SI units. Axes: origin at
+the rear contact point, x forward, y to the right, z down, so that heights are negative z.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lean_yaw_env.validation import require_finite, require_number
-from lean_yaw_env.vehicles.linear_motion import FloatArray
+from lean_yaw_env.vehicles.stability import FloatArray
 
 _INERTIA_SLACK = 1e-9
 """Relative room left for round-off when a principal inertia equals the sum of the two others."""
@@ -27,13 +26,10 @@ class Wheel:
 
     Parameters
     ----------
-    radius : float
-        m. Positive.
-    mass : float
-        kg. Not negative.
+    radius, mass : float
+        m, positive; kg, not negative.
     inertia_xx, inertia_yy : float
-        About a diameter and about the axle, kg m^2. Not negative; the axle's is at most twice the
-        diameter's.
+        About a diameter and about the axle, kg m^2. Not negative; the axle's is at most twice the diameter's.
 
     Raises
     ------
@@ -68,8 +64,8 @@ class FrameBody:
     x, z : float
         Centre of mass, forward of the rear contact and below the floor (negative: above), m.
     inertia_xx, inertia_xz, inertia_yy, inertia_zz : float
-        Entries of the inertia tensor about the centre of mass, kg m^2. The principal values must
-        be possible for a body: none negative, none above the sum of the two others.
+        Entries of the inertia tensor about the centre of mass, kg m^2. The principal values must be possible for a body: none negative,
+        none above the sum of the two others.
 
     Raises
     ------
@@ -105,10 +101,8 @@ class BicycleParameters:
 
     Parameters
     ----------
-    wheelbase : float
-        w, m. Positive.
-    trail : float
-        c, of the front contact behind the steer axis, m; negative in front of it.
+    wheelbase, trail : float
+        w, m, positive; c, of the front contact behind the steer axis, m, negative in front of it.
     steer_axis_tilt : float
         lambda, of the steer axis from the vertical, backwards, rad, within (-pi/2, pi/2).
     gravity : float
@@ -152,10 +146,9 @@ BENCHMARK_2007 = BicycleParameters()
 def parameters_2005() -> BicycleParameters:
     """The bicycle behind eq. (5) of the walking paper, m, kg, rad.
 
-    The paper prints the matrices and refers to Schwab, Meijaard and Papadopoulos (2005) for the
-    parameters. These reproduce every printed digit. They differ from the 2007 benchmark in the
-    steer axis (a head angle of arctan 3), in the orientation of the fork's inertia (its principal
-    values 0.06, 0.06 and 0.006 are the same) and in wheels that are exactly flat rings.
+    The paper prints the matrices and refers to Schwab, Meijaard and Papadopoulos (2005) for the parameters. These reproduce every printed
+    digit. They differ from the 2007 benchmark in the steer axis (a head angle of arctan 3), in the orientation of the fork's inertia (its
+    principal values 0.06, 0.06 and 0.006 are the same) and in wheels that are exactly flat rings.
     """
     return BicycleParameters(
         steer_axis_tilt=math.atan(1.0 / 3.0),
@@ -185,21 +178,7 @@ class _Body(NamedTuple):
     zz: float
 
 
-def _bodies(p: BicycleParameters) -> tuple[_Body, ...]:
-    """Rear wheel, rear frame, front frame and front wheel, each with its inertia about its own centre of mass."""
-    rear, front = p.rear_wheel, p.front_wheel
-    frames = (
-        _Body(f.mass, f.x, f.z, f.inertia_xx, f.inertia_xz, f.inertia_zz)
-        for f in (p.rear_frame, p.front_frame)
-    )
-    return (
-        _Body(rear.mass, 0.0, -rear.radius, rear.inertia_xx, 0.0, rear.inertia_xx),
-        *frames,
-        _Body(front.mass, p.wheelbase, -front.radius, front.inertia_xx, 0.0, front.inertia_xx),
-    )
-
-
-def _together(bodies: tuple[_Body, ...], about: tuple[float, float] | None = None) -> _Body:
+def _together(bodies: list[_Body], about: tuple[float, float] | None = None) -> _Body:
     """Bodies as one, with the inertia about a point (x, z), by default about their common centre of mass."""
     mass = sum(b.mass for b in bodies)
     x = sum(b.mass * b.x for b in bodies) / mass
@@ -216,24 +195,22 @@ def _together(bodies: tuple[_Body, ...], about: tuple[float, float] | None = Non
 
 
 def canonical_matrices(parameters: BicycleParameters) -> CanonicalMatrices:
-    """Matrices of the linearised equations of lean and steer.
+    """Matrices of the linearised equations of lean and steer, eqs. (A 1) to (A 24) of the 2007 benchmark paper in its notation.
 
-    Parameters
-    ----------
-    parameters : BicycleParameters
-
-    Returns
-    -------
-    CanonicalMatrices
-        The stiffness due to gravity is not multiplied by g.
-
-    Notes
-    -----
-    Equations (A 1) to (A 24) of the 2007 benchmark paper, in their order and notation.
+    The stiffness due to gravity is not multiplied by g.
     """
-    bodies = _bodies(parameters)
-    whole, front = _together(bodies, about=(0.0, 0.0)), _together(bodies[2:])
     w, c = parameters.wheelbase, parameters.trail
+    rear, front = (
+        [
+            _Body(wheel.mass, x, -wheel.radius, wheel.inertia_xx, 0.0, wheel.inertia_xx),
+            _Body(f.mass, f.x, f.z, f.inertia_xx, f.inertia_xz, f.inertia_zz),
+        ]
+        for wheel, x, f in (
+            (parameters.rear_wheel, 0.0, parameters.rear_frame),
+            (parameters.front_wheel, w, parameters.front_frame),
+        )
+    )
+    whole, front = _together(rear + front, about=(0.0, 0.0)), _together(front)
     sine, cosine = math.sin(parameters.steer_axis_tilt), math.cos(parameters.steer_axis_tilt)
 
     # The front assembly about the steer axis: u is its distance in front of that axis.
@@ -262,9 +239,6 @@ def canonical_matrices(parameters: BicycleParameters) -> CanonicalMatrices:
         ),
         gravity_stiffness=np.array([[whole.mass * whole.z, -s_a], [-s_a, -s_a * sine]]),
         speed_stiffness=np.array(
-            [
-                [0.0, (spin - whole.mass * whole.z) * rate],
-                [0.0, (s_a + front_spin * sine) * rate],
-            ]
+            [[0.0, (spin - whole.mass * whole.z) * rate], [0.0, (s_a + front_spin * sine) * rate]]
         ),
     )

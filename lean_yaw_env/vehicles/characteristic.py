@@ -1,8 +1,7 @@
 """The characteristic polynomial of a bicycle and the speeds at which its roots do something.
 
-det(M s^2 + v C1 s + K0 + v^2 K2) is a quartic in the eigenvalue s whose coefficients are
-polynomials in the speed v. The special speeds are roots of polynomials made of those coefficients;
-nothing is read off a grid.
+det(M s^2 + v C1 s + K0 + v^2 K2) is a quartic in the eigenvalue s whose coefficients are polynomials in the speed v. The special speeds are
+roots of polynomials made of those coefficients; nothing is read off a grid.
 """
 
 from __future__ import annotations
@@ -14,46 +13,30 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.optimize import root
 
-from lean_yaw_env.vehicles.linear_motion import FloatArray
+from lean_yaw_env.vehicles.stability import FloatArray
 
 _NEGLIGIBLE = 1e-14
 """Relative size below which a coefficient is taken for round-off of zero."""
 _NEARLY_REAL = 1e-5
-"""Relative imaginary part up to which a computed root of a polynomial may be a real one; false
-ones are refused by the refinement that follows, or lie where nothing changes."""
+"""Relative imaginary part up to which a computed root of a polynomial may be a real one; false ones are refused by the refinement that
+follows, or lie where nothing changes."""
 
 
 class DoubleRoot(NamedTuple):
-    """Two real eigenvalues meet."""
+    """Two real eigenvalues (1 / s) meet at a speed (m / s)."""
 
     speed: float
-    """m / s."""
     eigenvalue: float
-    """1 / s."""
-
-
-def _mixed_determinant(a: FloatArray, b: FloatArray) -> float:
-    """The part of det(a + b) that is linear in both, for (2, 2) matrices."""
-    return float(a[0, 0] * b[1, 1] + a[1, 1] * b[0, 0] - a[0, 1] * b[1, 0] - a[1, 0] * b[0, 1])
-
-
-def _determinant(a: FloatArray) -> float:
-    return 0.5 * _mixed_determinant(a, a)
 
 
 @dataclass(frozen=True, eq=False)
 class CharacteristicPolynomial:
-    """sum_i coefficients[i](v) s^i, i = 0 to 4.
+    """sum_i coefficients[i](v) s^i, i = 0 to 4, where odd powers of s have odd polynomials and even powers even ones.
 
-    Parameters
-    ----------
-    coefficients : five polynomials in the speed
-        Odd powers of s have odd polynomials, even powers even ones.
-    speed_scale : float
-        A typical speed of this bicycle, m / s, by which round-off is judged.
+    ``speed_scale`` is a typical speed of this bicycle, m / s, against which round-off is compared.
     """
 
-    coefficients: tuple[Polynomial, Polynomial, Polynomial, Polynomial, Polynomial]
+    coefficients: tuple[Polynomial, ...]
     speed_scale: float
 
     @classmethod
@@ -63,21 +46,19 @@ class CharacteristicPolynomial:
         """Expand the determinant of eq. (4), each matrix of shape (2, 2)."""
         largest = float(np.max(np.abs(dynamic)))
         scale = float(np.sqrt(np.max(np.abs(static)) / largest)) if largest > 0.0 else 1.0
-        mixed = _mixed_determinant
-        return cls(
-            coefficients=(
-                Polynomial(
-                    [_determinant(static), 0.0, mixed(static, dynamic), 0.0, _determinant(dynamic)]
-                ),
-                Polynomial([0.0, mixed(damping, static), 0.0, mixed(damping, dynamic)]),
-                Polynomial(
-                    [mixed(mass, static), 0.0, mixed(mass, dynamic) + _determinant(damping)]
-                ),
-                Polynomial([0.0, mixed(mass, damping)]),
-                Polynomial([_determinant(mass)]),
-            ),
-            speed_scale=scale if scale > 0.0 else 1.0,
-        )
+        zero = np.zeros((2, 2))
+        # Matrices of s^0, s^1 and s^2, each a polynomial in the speed
+        powers = [(static, zero, dynamic), (zero, damping), (mass,)]
+
+        def entry(power: int, row: int, column: int) -> Polynomial:
+            return Polynomial([matrix[row, column] for matrix in powers[power]])
+
+        coefficients = [Polynomial([0.0])] * 5
+        for i in range(3):
+            for j in range(3):
+                coefficients[i + j] += entry(i, 0, 0) * entry(j, 1, 1)
+                coefficients[i + j] -= entry(i, 0, 1) * entry(j, 1, 0)
+        return cls(tuple(coefficients), scale if scale > 0.0 else 1.0)
 
     def derivative(
         self, speed: float, eigenvalue: complex, *, in_eigenvalue: int, in_speed: int
@@ -100,8 +81,8 @@ class CharacteristicPolynomial:
     def imaginary_pairs(self) -> list[tuple[float, float]]:
         """Positive speeds, rising, with a pair of imaginary eigenvalues, and their frequency.
 
-        Hurwitz' determinant a1 a2 a3 - a0 a3^2 - a4 a1^2 vanishes where two roots add up to zero;
-        they are imaginary where a1 / a3, minus their square, is positive.
+        Hurwitz' determinant a1 a2 a3 - a0 a3^2 - a4 a1^2 vanishes where two roots add up to zero; they are imaginary where a1 / a3, minus
+        their square, is positive.
         """
         a0, a1, a2, a3, a4 = self.coefficients
         pairs = []
@@ -113,8 +94,8 @@ class CharacteristicPolynomial:
     def double_roots(self) -> list[DoubleRoot]:
         """Where two real eigenvalues meet at a positive speed, by rising speed.
 
-        The discriminant, a polynomial of high degree, gives the candidates. Each is refined as a
-        solution of p = dp/ds = 0, which is well conditioned where the discriminant is not.
+        The discriminant, a polynomial of high degree, gives the candidates. Each is refined as a solution of p = dp/ds = 0, which is well
+        conditioned where the discriminant is not.
         """
         found: list[DoubleRoot] = []
         for speed in self._positive_roots(self._discriminant()):
@@ -131,10 +112,7 @@ class CharacteristicPolynomial:
         return sorted(found)
 
     def _discriminant(self) -> Polynomial:
-        """Discriminant of the quartic, a polynomial in the speed.
-
-        From the invariants of e s^4 + d s^3 + c s^2 + b s + a: 27 disc = 4 I^3 - J^2.
-        """
+        """27 times the discriminant of e s^4 + d s^3 + c s^2 + b s + a from its invariants, 4 I^3 - J^2; a polynomial in the speed."""
         a, b, c, d, e = self.coefficients
         invariant_2 = 12 * e * a - 3 * d * b + c**2
         invariant_3 = 72 * e * c * a + 9 * d * c * b - 27 * e * b**2 - 27 * a * d**2 - 2 * c**3

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from lean_yaw_env.validation import require_vector
 from lean_yaw_env.vehicles.bicycle import LinearBicycle
-from lean_yaw_env.vehicles.linear_motion import ComplexArray, FloatArray
+from lean_yaw_env.vehicles.stability import ComplexArray, FloatArray
 
 BRANCH_NAMES = ("weave_upper", "weave_lower", "capsize", "caster")
-"""Order of the branches. The weave is two branches: a conjugate pair, positive frequency first, or
-at low speed two real roots, the greater first."""
+"""Order of the branches. The weave is two branches: a conjugate pair, positive frequency first, or at low speed two real roots, the greater
+first."""
 
 UNNAMED_BRANCHES = ("mode_1", "mode_2", "mode_3", "mode_4")
 """Of a bicycle that at no speed has one oscillation and two real roots. Order: at the speed where the branches
@@ -34,16 +34,21 @@ _SAME = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class EigenvalueBranches:
-    """Eigenvalues against speed, one column for each mode."""
+    """Eigenvalues against speed, one column for each mode.
+
+    Attributes
+    ----------
+    names : of the columns, ``BRANCH_NAMES``, or ``UNNAMED_BRANCHES`` where those names have no meaning
+    speeds : shape (n,), m / s
+    eigenvalues : shape (n, 4), 1 / s
+    mode_shapes : shape (n, 4, 2)
+        (lean, steer), of unit length, lean real and not negative.
+    """
 
     names: tuple[str, ...]
-    """Of the columns: ``BRANCH_NAMES``, or ``UNNAMED_BRANCHES`` where those names have no meaning."""
     speeds: FloatArray
-    """Shape (n,), m / s."""
     eigenvalues: ComplexArray
-    """Shape (n, 4), 1 / s."""
     mode_shapes: ComplexArray
-    """Shape (n, 4, 2): (lean, steer), of unit length, lean real and not negative."""
 
     @property
     def weave(self) -> ComplexArray:
@@ -91,11 +96,10 @@ class _Modes:
 def follow_eigenvalues(bicycle: LinearBicycle, speeds: ArrayLike) -> EigenvalueBranches:
     """Follow the four eigenvalues of a bicycle in the speed, each under its mode's name.
 
-    The names are given where they are beyond doubt, at a speed with one oscillation and two real
-    roots: the oscillation is the weave, of the real roots the greater is the capsize mode and the
-    lesser the caster mode. From there each mode is followed up and down, in steps small enough
-    that the assignment of old to new eigenvalues and mode shapes is clearly the cheapest. A bicycle
-    without such a speed has branches without names.
+    The names are given where they are beyond doubt, at a speed with one oscillation and two real roots: the oscillation is the weave, of the
+    real roots the greater is the capsize mode and the lesser the caster mode. From there each mode is followed up and down, in steps small
+    enough that the assignment of old to new eigenvalues and mode shapes is clearly the cheapest. A bicycle without such a speed has branches
+    without names.
 
     Parameters
     ----------
@@ -117,7 +121,10 @@ def follow_eigenvalues(bicycle: LinearBicycle, speeds: ArrayLike) -> EigenvalueB
         for speed in side:
             while abs(speed - modes.speed) > _longest_step(bicycle, modes):
                 modes = _step(bicycle, modes, math.copysign(math.inf, speed - modes.speed))
-            found[float(speed)] = _follow_to(bicycle, modes, float(speed))
+            there = modes
+            while there.speed != speed:
+                there = _step(bicycle, there, float(speed))
+            found[float(speed)] = there
     rows = [found[float(speed)] for speed in ordered[place.reshape(-1)]]
     return EigenvalueBranches(
         names=names,
@@ -130,8 +137,8 @@ def follow_eigenvalues(bicycle: LinearBicycle, speeds: ArrayLike) -> EigenvalueB
 def _start(bicycle: LinearBicycle) -> tuple[_Modes, tuple[str, ...]]:
     """Modes at a speed with one complex pair and two real roots, in the order of the names.
 
-    The number of real roots changes only where two real ones meet, so one speed of each range between those
-    speeds is enough. The fastest range is tried first. Where none will do, the modes there have no names.
+    The number of real roots changes only where two real ones meet, so one speed of each range between those speeds is enough. The fastest
+    range is tried first. Where none will do, the modes there have no names.
     """
     scale = bicycle.characteristic.speed_scale
     borders = [0.0, *(meeting.speed for meeting in bicycle.double_roots())]
@@ -151,13 +158,6 @@ def _sorted_modes(bicycle: LinearBicycle, speed: float) -> _Modes:
     values, shapes = bicycle.modes(speed)
     order = np.lexsort((-values.imag, -values.real, values.imag == 0.0))
     return _Modes(float(speed), values[order], shapes[order])
-
-
-def _follow_to(bicycle: LinearBicycle, modes: _Modes, speed: float) -> _Modes:
-    """Follow the modes to another speed."""
-    while modes.speed != speed:
-        modes = _step(bicycle, modes, speed)
-    return modes
 
 
 def _longest_step(bicycle: LinearBicycle, modes: _Modes) -> float:

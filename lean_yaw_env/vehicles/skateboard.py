@@ -1,9 +1,8 @@
 """The skateboard: lean and yaw coupled kinematically, in one degree of freedom.
 
-Section 2.1 of Wisse and Schwab, "Skateboards, Bicycles, and Three-dimensional Biped Walking
-Machines: Velocity-dependent Stability by Means of Lean-to-yaw Coupling" (2005), eqs. (1) to (3), a
-simplified version of Hubbard (1979). The rider is a point mass fixed to a massless board; leaning
-turns both pairs of wheels about their tilted axes. SI units.
+Section 2.1 of Wisse and Schwab, "Skateboards, Bicycles, and Three-dimensional Biped Walking Machines: Velocity-dependent Stability by Means
+of Lean-to-yaw Coupling" (2005), eqs. (1) to (3), a simplified version of Hubbard (1979). The rider is a point mass fixed to a massless
+board; leaning turns both pairs of wheels about their tilted axes. SI units.
 """
 
 from __future__ import annotations
@@ -16,51 +15,50 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lean_yaw_env.validation import require_finite, require_number, require_vector
-from lean_yaw_env.vehicles.linear_motion import ComplexArray, FloatArray, linear_motion
-from lean_yaw_env.vehicles.stability import SpeedRange, stable_speed_range
+from lean_yaw_env.vehicles.stability import (
+    ComplexArray,
+    FloatArray,
+    SpeedRange,
+    linear_motion,
+    stable_speed_range,
+)
 
 
 class LeanEquation(NamedTuple):
-    """Coefficients of inertia * lean'' + damping * lean' + stiffness * lean = 0, eq. (2)."""
+    """Coefficients of inertia * lean'' + damping * lean' + stiffness * lean = 0, eq. (2): kg m^2, N m s / rad and N m / rad."""
 
     inertia: float
-    """Moment of inertia about the line of contact, kg m^2."""
     damping: float
-    """N m s / rad."""
     stiffness: float
-    """N m / rad; negative when the board falls over."""
+    """Negative when the board falls over."""
 
 
 @dataclass(frozen=True, eq=False)
 class SkateboardMotion:
-    """A time history of the linear motion; every field has shape (n,)."""
+    """A time history of the linear motion; every field has shape (n,), in s, rad, rad / s and m.
+
+    A positive lean is towards the side that a positive heading turns to. The heading and the lateral position of the board's middle are zero
+    at time 0.
+    """
 
     times: FloatArray
-    """s."""
     lean: FloatArray
-    """rad; positive towards the side that positive heading turns to."""
     lean_rate: FloatArray
-    """rad / s."""
     heading: FloatArray
-    """rad; 0 at time 0."""
     lateral_position: FloatArray
-    """m, of the middle of the board; 0 at time 0."""
 
 
 @dataclass(frozen=True)
 class Skateboard:
     """A rider standing stiffly on a skateboard.
 
-    The paper gives no numbers for its skateboard. The defaults are ours, round and plausible: an
-    adult whose centre of mass is 1 m above the floor, on a street board with trucks at 45 degrees
-    that are soft enough to need speed (critical speed close to 1 m/s). None of them is measured.
+    The paper gives no numbers for its skateboard. The defaults are round and plausible, not measured: an adult whose centre of mass is 1 m
+    above the floor, on a street board with trucks at 45 degrees that are soft enough to need speed (critical speed close to 1 m/s).
 
     Parameters
     ----------
-    mass : float
-        m, of the rider, kg. Positive.
-    rider_height : float
-        h, of the rider's centre of mass above the floor, m. Positive.
+    mass, rider_height : float
+        m and h, of the rider, kg, and of the rider's centre of mass above the floor, m. Positive.
     wheelbase : float
         w, between the front and the rear wheels, m. Positive.
     steering_tilt : float
@@ -75,13 +73,12 @@ class Skateboard:
     Raises
     ------
     ValueError
-        If a parameter is outside its range; the message names it.
+        If a parameter is outside its range.
 
     Notes
     -----
-    The paper only says that damping in the steering axis "could make it asymptotically stable".
-    Ours turns with the axis just as the spring does. The tilt cancels in the spring's projected
-    torque, 2 k theta in eq. (2), so it cancels in the damper's, which is 2 c theta'.
+    The paper only says that damping in the steering axis "could make it asymptotically stable". This damper turns with the axis just as the
+    spring does. The tilt cancels in the spring's projected torque, 2 k theta in eq. (2), so it cancels in the damper's, which is 2 c theta'.
     """
 
     mass: float = 70.0
@@ -104,19 +101,9 @@ class Skateboard:
         return 2.0 / (self.wheelbase * math.tan(self.steering_tilt))
 
     def lateral_acceleration(self, lean: ArrayLike, speed: ArrayLike) -> FloatArray:
-        """Sideways acceleration of the board, eq. (1).
+        """Sideways acceleration of the board towards the side of the lean, eq. (1), m / s^2.
 
-        Parameters
-        ----------
-        lean : any shape
-            theta, rad.
-        speed : a shape that broadcasts with it
-            v, m / s.
-
-        Returns
-        -------
-        the broadcast shape
-            a = 2 v^2 theta / (w tan alpha), m / s^2, towards the side of the lean.
+        a = 2 v^2 theta / (w tan alpha), for leans (rad) and speeds (m / s) of shapes that broadcast.
 
         Raises
         ------
@@ -130,18 +117,7 @@ class Skateboard:
         return np.asarray(speeds**2 * self.curvature_per_lean() * angles)
 
     def equation_of_motion(self, speed: float) -> LeanEquation:
-        """Linear equation of the lean at a speed, eq. (2) with damping added.
-
-        Parameters
-        ----------
-        speed : float
-            v, m / s. The board is symmetric fore and aft: the sign makes no difference.
-
-        Raises
-        ------
-        ValueError
-            If the speed is not finite.
-        """
+        """Linear equation of the lean at a finite speed, m / s, eq. (2) with damping added. The speed's sign makes no difference."""
         v = require_finite("speed", speed)
         m, h = self.mass, self.rider_height
         return LeanEquation(
@@ -153,18 +129,10 @@ class Skateboard:
         )
 
     def eigenvalues(self, speeds: ArrayLike) -> ComplexArray:
-        """Eigenvalues of the linear lean motion at each speed.
+        """Eigenvalues of the lean at each speed, 1/s; shape (n, 2).
 
-        Parameters
-        ----------
-        speeds : a number or shape (n,)
-            m / s.
-
-        Returns
-        -------
-        shape (n, 2)
-            In 1/s; of a real pair the greater first, of a complex pair the one with positive
-            imaginary part.
+        Of a real pair the greater comes first, of a complex pair the one with positive imaginary part. ``speeds`` is a number or has shape
+        (n,), m / s.
 
         Raises
         ------
@@ -175,10 +143,7 @@ class Skateboard:
         return np.array(pairs, dtype=np.complex128)
 
     def critical_speed(self) -> float:
-        """Speed above which the board is not unstable, eq. (3), m / s.
-
-        0 where the springs alone hold the rider up (2 k >= m g h): never unstable in motion.
-        """
+        """Speed above which the board is not unstable, eq. (3), m / s; 0 where the springs alone hold the rider up (2 k >= m g h)."""
         m, h = self.mass, self.rider_height
         lacking = m * self.gravity * h - 2.0 * self.spring_stiffness
         return math.sqrt(max(lacking, 0.0) / (m * h * self.curvature_per_lean()))
@@ -186,16 +151,9 @@ class Skateboard:
     def motion(
         self, speed: float, times: ArrayLike, *, lean: float = 0.05, lean_rate: float = 0.0
     ) -> SkateboardMotion:
-        """Linear motion from a given lean, exact but for round-off.
+        """Linear motion from a lean (rad) and its rate (rad / s), exact but for round-off.
 
-        Parameters
-        ----------
-        speed : float
-            m / s.
-        times : a number or shape (n,)
-            s after the start.
-        lean, lean_rate : float
-            At time 0, rad and rad / s.
+        ``speed`` is in m / s; ``times`` is a number or has shape (n,), s after the start.
 
         Raises
         ------
@@ -205,25 +163,15 @@ class Skateboard:
             If an unstable motion outgrows floating point.
         """
         equation = self.equation_of_motion(speed)
-        start = np.array(
-            [require_finite("lean", lean), require_finite("lean_rate", lean_rate), 0.0, 0.0]
-        )
+        start = [require_finite("lean", lean), require_finite("lean_rate", lean_rate), 0.0, 0.0]
         samples = require_vector("times", times)
-        # Rows: lean, lean rate, heading (yaw rate = v / r_c), lateral position (v * heading).
-        matrix = np.array(
-            [
-                [0.0, 1.0, 0.0, 0.0],
-                [
-                    -equation.stiffness / equation.inertia,
-                    -equation.damping / equation.inertia,
-                    0,
-                    0,
-                ],
-                [speed * self.curvature_per_lean(), 0.0, 0.0, 0.0],
-                [0.0, 0.0, speed, 0.0],
-            ]
-        )
-        return SkateboardMotion(samples, *linear_motion(matrix, start, samples).T)
+        matrix = np.zeros((4, 4))
+        matrix[0, 1] = 1.0
+        matrix[1, 0] = -equation.stiffness / equation.inertia
+        matrix[1, 1] = -equation.damping / equation.inertia
+        matrix[2, 0] = speed * self.curvature_per_lean()  # yaw rate = v / r_c
+        matrix[3, 2] = speed
+        return SkateboardMotion(samples, *linear_motion(matrix, np.array(start), samples).T)
 
 
 @stable_speed_range.register
@@ -237,9 +185,8 @@ def _roots(equation: LeanEquation) -> tuple[complex, complex]:
     product = equation.stiffness / equation.inertia
     square = half**2 - product
     if square < 0.0:
-        frequency = math.sqrt(-square)
-        # 0 - half, not -half: an undamped root's real part is 0, not -0.
-        return complex(0.0 - half, frequency), complex(0.0 - half, -frequency)
+        pair = complex(0.0 - half, math.sqrt(-square))  # not -half: an undamped root is 0, not -0
+        return pair, pair.conjugate()
     lower = -half - math.sqrt(square)
     # half >= 0, so the lower root has no cancellation; the upper one follows from the product.
     return complex(product / lower if lower else 0.0), complex(lower)

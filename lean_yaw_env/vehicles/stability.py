@@ -1,8 +1,4 @@
-"""One meaning of "critical speed" for every vehicle.
-
-A vehicle takes part by registering with ``stable_speed_range``; ``critical_speed`` follows from it,
-unless the vehicle registers its own there too.
-"""
+"""What the vehicles share: one meaning of "critical speed", and the exact motion of a linear system."""
 
 from __future__ import annotations
 
@@ -10,33 +6,33 @@ import math
 from functools import singledispatch
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
 
 class SpeedRange(NamedTuple):
-    """Speeds between which upright straight motion is not unstable; ends included or not."""
+    """Speeds between which upright straight motion is not unstable, in the vehicle's unit; ends included or not."""
 
     lower: float
-    """In the vehicle's unit of speed."""
     upper: float
     """``inf`` where there is no upper end."""
 
 
 @singledispatch
 def stable_speed_range(vehicle: object) -> SpeedRange | None:
-    """Find the lowest range of forward speeds in which upright straight motion is not unstable.
+    """Find the lowest range of forward speeds in which upright straight motion is not unstable; None if there is none.
 
-    Not unstable: between the ends no eigenvalue has a positive real part. An undamped skateboard
-    is only marginally stable there; a bicycle is, in general, asymptotically stable.
+    Not unstable: between the ends no eigenvalue has a positive real part. An undamped skateboard is only marginally stable there; a bicycle
+    is, in general, asymptotically stable. Further ranges at higher speeds are not reported.
 
     Parameters
     ----------
-    vehicle : object
-        Of a registered type, such as ``Skateboard`` or ``LinearBicycle``.
-
-    Returns
-    -------
-    SpeedRange or None
-        None if the motion is unstable at every forward speed. Further ranges at higher speeds, if
-        any, are not reported.
+    vehicle : Skateboard, LinearBicycle, Walker or another registered type
+        ``stable_speed_range.register`` adds a type.
 
     Raises
     ------
@@ -49,28 +45,26 @@ def stable_speed_range(vehicle: object) -> SpeedRange | None:
     )
 
 
-@singledispatch
 def critical_speed(vehicle: object) -> float:
-    """Find the lowest speed above which upright straight motion is not unstable.
+    """The lower end of ``stable_speed_range``: 0 if the vehicle is not unstable however slowly it moves, ``inf`` if no speed makes it stable."""
+    speeds = stable_speed_range(vehicle)
+    return math.inf if speeds is None else speeds.lower
 
-    For a vehicle whose stable range also has an upper end, such as a bicycle, "above" means just
-    above: up to ``stable_speed_range(vehicle).upper``.
 
-    Parameters
-    ----------
-    vehicle : object
-        Of a registered type, such as ``Skateboard`` or ``LinearBicycle``.
-
-    Returns
-    -------
-    float
-        In the vehicle's unit of speed; 0 if it is not unstable however slowly it moves, ``inf`` if
-        no speed makes it stable.
+def linear_motion(matrix: FloatArray, start: FloatArray, times: FloatArray) -> FloatArray:
+    """Solve x' = A x by the matrix exponential, for each of the ``times`` (n,) from the ``start`` (k,) itself; shape (n, k).
 
     Raises
     ------
-    TypeError
-        If no rule is registered for this type.
+    OverflowError
+        If an unstable motion outgrows floating point before the last time.
     """
-    speeds = stable_speed_range(vehicle)
-    return math.inf if speeds is None else speeds.lower
+    with np.errstate(over="ignore", invalid="ignore"):
+        states = expm(times[:, None, None] * matrix) @ start
+    lost = ~np.all(np.isfinite(states), axis=1)
+    if np.any(lost):
+        raise OverflowError(
+            f"the motion outgrows floating point by time {times[lost].min():g} s; "
+            "ask for a shorter time"
+        )
+    return states

@@ -21,6 +21,12 @@ _NAMES = {LOOPBACK, "localhost"}
 _WALK = "/walk.json"
 
 
+def require_built() -> None:
+    """Raise ``FileNotFoundError`` if there is no built page."""
+    if not (PAGE / "index.html").is_file():
+        raise FileNotFoundError(f"{PAGE} holds no built page: run npm run build in web")
+
+
 class _Handler(SimpleHTTPRequestHandler):
     """Files of the page, and one walk. Lists no folders, and answers only to this machine's own names."""
 
@@ -62,7 +68,7 @@ class _Handler(SimpleHTTPRequestHandler):
 
 
 class PageServer:
-    """The page on a port of the loopback interface, served until closed; a context manager.
+    """The page on a port of the loopback interface, at ``address``, served until closed; a context manager.
 
     Parameters
     ----------
@@ -70,11 +76,6 @@ class PageServer:
         A walk saved by ``Walk.save``, which the page opens.
     port : [0, 65535]
         0 takes any free one.
-
-    Attributes
-    ----------
-    address : str
-        Of the page.
 
     Raises
     ------
@@ -85,8 +86,7 @@ class PageServer:
     """
 
     def __init__(self, walk: str | Path | None = None, *, port: int = 0) -> None:
-        if not (PAGE / "index.html").is_file():
-            raise FileNotFoundError(f"{PAGE} holds no built page: run npm run build in web")
+        require_built()
         place = None if walk is None else Path(walk).resolve()
         if place is not None and not place.is_file():
             raise FileNotFoundError(f"no walk at {place}")
@@ -113,18 +113,7 @@ class PageServer:
 
 
 def view(walk: str | Path | None = None, *, port: int = 0, open_browser: bool = True) -> PageServer:
-    """Serve the page on this machine only, and open it in the browser.
-
-    Parameters
-    ----------
-    walk, port : see ``PageServer``
-    open_browser : bool
-
-    Raises
-    ------
-    FileNotFoundError, OSError
-        As ``PageServer``.
-    """
+    """Serve the page on this machine only, and open it in the browser. Arguments and errors as for ``PageServer``."""
     server = PageServer(walk, port=port)
     if open_browser:
         webbrowser.open(server.address)
