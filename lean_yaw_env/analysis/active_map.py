@@ -142,13 +142,14 @@ class ActiveMap(SectionMap):
     def step_many(
         self, states: Vector, carried: Vector, foot: int
     ) -> tuple[Vector, Vector, Vector]:
-        commands = np.empty((len(states), 3))
-        commands[:, 0], commands[:, 1], commands[:, 2] = (
-            self.inter_leg_angle,
-            self.mass_offset[foot],
-            carried,
-        )
-        rows = step_rows(self._bodies, commands, states, foot)
+        command = np.array([[self.inter_leg_angle, self.mass_offset[foot]]])
+        return self.step_commanded(states, carried, command, foot)
+
+    def step_commanded(
+        self, states: Vector, carried: Vector, commands: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
+        whole = np.column_stack([np.broadcast_to(commands, (len(states), 2)), carried])
+        rows = step_rows(self._bodies, whole, states, foot)
         return rows[:, :STATE_SIZE], rows[:, _OFFSET], rows[:, _STATUS]
 
     def search(self) -> Iterator[Vector]:
