@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
 from lean_yaw_env.cli import rows, screen
@@ -176,6 +177,27 @@ def _vehicle(record: rows.Record) -> Output:
         screen.show_records("eigenvalues, 1/s", record["eigenvalues"])
 
     return Output(record, show)
+
+
+@command()
+def play(
+    env_id: Annotated[str, typer.Argument(help="An environment, such as LeanYaw/Heading-v0.")],
+    speed: Annotated[float, typer.Option(help="Times real time for legs of a metre.")] = 0.5,
+    seed: Annotated[int | None, typer.Option(help="Of the first episode.")] = None,
+) -> Output:
+    """Steer the walker in a window: a and d move the masses left and right, w and s walk faster and slower."""
+    import gymnasium as gym
+    from gymnasium.utils.play import play as play_env
+
+    from lean_yaw_env.envs import RealTime
+
+    try:
+        env = gym.make(env_id, render_mode="rgb_array", mirror=False)
+    except (gym.error.Error, TypeError) as error:
+        raise ValueError(f"env_id must be an environment of lean_yaw_env: {error}") from error
+    window = RealTime(env, speed=speed)
+    still = np.zeros(env.action_space.shape or (), dtype=np.float32)
+    return Output({"env_id": env_id}, lambda: play_env(window, seed=seed, noop=still))
 
 
 @command()
