@@ -643,8 +643,6 @@ def test_keys_cover_what_can_be_held_and_steer_to_their_side() -> None:
     "name", ["TimeAwareObservation", "NumpyToTorch", "RecordEpisodeStatistics"]
 )
 def test_gymnasium_s_wrappers_take_it(name: str) -> None:
-    if name == "NumpyToTorch":
-        pytest.importorskip("array_api_compat")
     env = getattr(gym.wrappers, name)(gym.make("LeanYaw/Push-v0", max_episode_steps=5))
     env.reset(seed=1)
     zero = env.unwrapped.action_space.sample() * 0
@@ -682,9 +680,9 @@ def test_a_bad_option_is_refused_by_name(options: dict[str, Any], message: str) 
 
 
 def test_an_unknown_option_is_refused() -> None:
-    with pytest.raises(TypeError, match="option 'wind' is unknown"):
+    with pytest.raises(TypeError, match="unexpected keyword argument 'wind'"):
         WalkerEnv("Walk", wind=1.0)
-    with pytest.raises(TypeError, match="option 'slop' is unknown; did you mean 'slope'"):
+    with pytest.raises(TypeError, match="unexpected keyword argument 'slop'; did you mean 'slope'"):
         WalkerEnv("Walk", slop=0.01)
 
 

@@ -37,7 +37,7 @@ class CheckpointError(ValueError):
 
 
 class EndedEpisode(NamedTuple):
-    """An ended episode: environment steps of the training at its end, return, number of steps, and whether only the time limit ended it."""
+    """An ended episode: environment steps of the training at its end, return, number of steps, and whether the time limit or a success ended it."""
 
     steps: int
     value: float
@@ -87,14 +87,11 @@ class TrainingLog:
             header, *lines = path.read_text(encoding="utf-8").splitlines()
             if header != _CSV_HEADER:
                 raise ValueError(f"its columns must be {_CSV_HEADER}")
-            rows = [(int(n), float(r), int(m), s != "0") for n, r, m, s in map(_cells, lines)]
+            cells = (line.split(",") for line in lines)
+            rows = [(int(n), float(r), int(m), s != "0") for n, r, m, s in cells]
         except (OSError, ValueError) as error:
             raise ValueError(f"no episodes can be read from {str(path)!r}: {error}") from error
         return cls.of(rows, seconds)
-
-
-def _cells(line: str) -> list[str]:
-    return line.split(",")
 
 
 def flattened(state: State, prefix: str = "") -> Arrays:
@@ -140,18 +137,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
 
 
 class Recorder:
-    """Keeps a training's log, shows its progress and writes its checkpoints.
-
-    Parameters
-    ----------
-    total : environment steps of the whole training
-    capture : returns everything that decides how the training continues, between two updates
-    checkpoint : its file; None for no checkpoints
-    seconds : least time between two checkpoints
-    progress : show a bar
-    label : of the bar
-    report : called between updates
-    """
+    """Keeps the log of a training of ``total`` steps, shows its progress and writes its checkpoints, whose state ``capture`` returns."""
 
     def __init__(
         self,

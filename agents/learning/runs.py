@@ -70,9 +70,15 @@ class Training:
 
     @classmethod
     def of_task(
-        cls, task: str, *, seed: int = 0, steps: int | None = None, **others: Any
+        cls,
+        task: str,
+        *,
+        seed: int = 0,
+        steps: int | None = None,
+        options: EnvOptions | None = None,
+        **others: Any,
     ) -> Training:
-        """The training with the package's settings for a task, with another number of steps if one is given.
+        """The training with the package's settings for a task, with another number of steps and other options if they are given.
 
         Raises
         ------
@@ -83,7 +89,7 @@ class Training:
         settings = settings_for(others.get("algorithm", cls.algorithm), task)
         if steps is not None:
             settings = replace(settings, steps=steps)
-        return cls(env_id, seed, settings, EnvOptions(), **others)
+        return cls(env_id, seed, settings, options or EnvOptions(), **others)
 
     @property
     def task(self) -> str:

@@ -252,12 +252,8 @@ def _run_in_process(folder: Path, done: Any) -> None:
 
 def seeds_table(result: SeriesResult) -> Table:
     """A table of one series: a metric to a row, with the median and the range over its seeds."""
-    table = Table(
-        title=f"means over episodes of {len(result.seeds)} seeds' policies",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        pad_edge=False,
-    )
+    title = f"means over episodes of {len(result.seeds)} seeds' policies"
+    table = Table(title=title, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
     table.add_column("metric", min_width=16)
     one_by_one = result.seeds if len(result.seeds) <= _MOST_COLUMNS else ()
     for name in ("median", "lowest", "highest", *(f"seed {seed}" for seed in one_by_one)):

@@ -50,7 +50,8 @@ class _Callback(BaseCallback):
         self._buffer.durations[self._buffer.pos] = walkers.step_durations()
         for i in np.flatnonzero(self.locals["dones"]):
             info = self.locals["infos"][i]
-            episode, survived = info["episode"], info["TimeLimit.truncated"]
+            episode = info["episode"]
+            survived = info["TimeLimit.truncated"] or bool(info.get("is_success", False))
             self._recorder.add(
                 EndedEpisode(self.num_timesteps, episode["r"], episode["l"], survived)
             )
@@ -184,7 +185,7 @@ class StableBaselinesLearner:
         np.random.set_state({"bit_generator": "MT19937", **state["numpy"]})  # noqa: NPY002
 
     def _moments(self) -> dict[str, Any]:
-        found = {"returns": self._normaliser.ret_rms}
+        found: dict[str, Any] = {"returns": self._normaliser.ret_rms}
         if self._normaliser.norm_obs:
             found["observations"] = self._normaliser.obs_rms
         return found

@@ -105,7 +105,7 @@ def tune(
     Parameters
     ----------
     storage : file of the study, made if it does not exist; None to keep it in memory
-    out : JSON file for the best settings so far, written after each trial; see ``best_record``
+    out : JSON file for the best settings so far, written after each trial, as ``shipping.ship`` takes it
     progress : show a bar for each training
     shown : takes a line for each trial
 
@@ -125,7 +125,8 @@ def tune(
         best = best_trial(study)
         if best is not None and out is not None:
             out.parent.mkdir(parents=True, exist_ok=True)
-            write_json(out, best_record(tuning, best))
+            found = {"trial": best.number, "score": best.value, "values": best.user_attrs["values"]}
+            write_json(out, asdict(tuning) | found)
         shown(f"{done()} of {trials}: {result_words(trial)}; {result_words(best)} is the best")
 
     if done() < trials:
@@ -138,21 +139,8 @@ def tune(
 def best_trial(study: optuna.Study) -> FrozenTrial | None:
     """The trial with the highest score, or None if none is complete."""
     complete = study.get_trials(states=(TrialState.COMPLETE,))
-    return max(
-        (trial for trial in complete if "values" in trial.user_attrs),
-        key=lambda trial: -math.inf if trial.value is None else trial.value,
-        default=None,
-    )
-
-
-def best_record(tuning: Tuning, best: FrozenTrial) -> dict[str, Any]:
-    """The best settings and where they come from, as plain values: what ``shipping.ship_settings`` takes."""
-    return {
-        **asdict(tuning),
-        "trial": best.number,
-        "score": best.value,
-        "values": best.user_attrs["values"],
-    }
+    sound = [trial for trial in complete if "values" in trial.user_attrs]
+    return max(sound, key=lambda trial: trial.values[0], default=None)
 
 
 def result_words(trial: FrozenTrial | None) -> str:

@@ -293,8 +293,20 @@ def search_active(section_map: ActiveMap, *, exact: bool) -> Vector:
     offsets = f"{left:g}" if left == right else f"({left:g}, {right:g})"
     raise NoGaitError(
         f"no gait found for {section_map.walker.parameters} with inter-leg angle "
-        f"{section_map.inter_leg_angle:g} and mass offset {offsets}; tried: {'; '.join(tried)}"
+        f"{section_map.inter_leg_angle:g} and mass offset {offsets}; tried: {'; '.join(tried)}. "
+        f"{_advice(section_map)}"
     )
+
+
+def _advice(section_map: ActiveMap) -> str:
+    """What to change where no gait was found."""
+    slope, offset = section_map.value("slope"), section_map.value("mass_offset")
+    if slope <= 0.0 and section_map.value("alternating_offset") == 0.0:
+        return "Try a positive slope, or pump: an alternating offset near 0.03 drives the walker"
+    most = math.tan(slope)
+    if abs(offset) >= most > 0.0 and not section_map.walker.parameters.slope_turns:
+        return f"Try a mass offset well within ±{most:.3g}, the most that this slope can balance, or a steeper slope"
+    return "Try a steeper slope, a smaller inter-leg angle or mass offset, narrower hips, or an ankle tilt near 0.5"
 
 
 def _planar_guess(section_map: ActiveMap) -> Vector:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy as copied
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import EzPickle, seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -59,6 +61,7 @@ class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float
     """
 
     metadata: dict[str, Any] = {}  # noqa: RUF012 (each environment sets its own)
+    _spec: EnvSpec | None = None
 
     def __init__(
         self,
@@ -206,6 +209,19 @@ class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float
         self._ended[:] = ended
         if self._gallery is not None:
             self._gallery.restart(np.ones(self.num_envs, dtype=np.bool_))
+
+    @property
+    def spec(self) -> EnvSpec | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """What the environment is made from, its ``max_episode_steps`` included; ``gymnasium.make_vec`` sets it."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = copied(spec)
+        if self._spec is not None:
+            # make_vec leaves it among the arguments
+            limit = self._spec.kwargs.get("max_episode_steps", self._spec.max_episode_steps)
+            self._spec.max_episode_steps = limit
 
     def _require_actions(self, actions: ArrayLike) -> NDArray[np.float32]:
         chosen = np.asarray(actions, dtype=np.float32)
