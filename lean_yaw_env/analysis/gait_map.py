@@ -29,7 +29,7 @@ from lean_yaw_env.analysis.storage import Growing, require_axis
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.records import Body, Outcome
 from lean_yaw_env.parameters import STATE_SIZE, Vector
-from lean_yaw_env.validation import require_count
+from lean_yaw_env.validation import require_count, require_flag, require_mapping
 
 if TYPE_CHECKING:
     import xarray
@@ -91,6 +91,7 @@ def stability_map(
         If an argument is outside its range, or the file holds another map.
     """
     require_count("threads", threads, 1, 1024)
+    require_flag("progress", progress)
     grid = _Grid(section_map_of(walker, **command), axes)
     values = _empty(grid.section_map, grid.n)
     values["status"][:] = NOT_YET
@@ -118,7 +119,7 @@ class _Grid:
     def __init__(
         self, section_map: SectionMap, axes: Mapping[str, Sequence[float] | Vector]
     ) -> None:
-        if not 1 <= len(axes) <= 3:
+        if not 1 <= len(require_mapping("axes", axes)) <= 3:
             raise ValueError(f"axes must name one to three parameters, got {list(axes)}")
         for name in axes:
             section_map = section_map.along(name)
