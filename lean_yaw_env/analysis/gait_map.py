@@ -257,26 +257,25 @@ def _walker_grid(section_map: ActiveMap, points: Mapping[str, Vector], threads: 
 def _spread(
     grid: _Grid, values: Columns, fresh: NDArray[np.intp], threads: int
 ) -> NDArray[np.intp]:
-    """Try the neighbours, where none was found, of points that have just got a gait; those found."""
+    """Try the neighbours, where none was found, of points that have just got a gait, direction by direction; those found."""
     places = np.array(np.unravel_index(fresh, grid.shape))
-    tried, guess_from = [], []
+    found: list[NDArray[np.intp]] = []
     for axis, size in enumerate(grid.shape):
         for step in (-1, 1):
             there = places.copy()
             there[axis] += step
             inside = (there[axis] >= 0) & (there[axis] < size)
-            tried.append(np.ravel_multi_index(tuple(there[:, inside]), grid.shape))
-            guess_from.append(fresh[inside])
-    points, first = np.unique(np.concatenate(tried), return_index=True)
-    sources = np.concatenate(guess_from)[first]
-    waits = values["status"][points] == NONE_FOUND
-    points, sources = points[waits], sources[waits]
-    found = np.zeros(points.size, dtype=bool)
-    for start in range(0, points.size, _CHUNK):
-        part = slice(start, start + _CHUNK)
-        here, guesses = points[part], values["state"][sources[part]]
-        rows = gaits_at(grid.section_map, grid.points(here), guesses, threads)
-        found[part] = good = rows["status"] == FOUND
-        for name, column in rows.items():
-            values[name][here[good]] = column[good]
-    return points[found]
+            points = np.ravel_multi_index(tuple(there[:, inside]), grid.shape)
+            waits = values["status"][points] == NONE_FOUND
+            points, sources = points[waits], fresh[inside][waits]
+            for start in range(0, points.size, _CHUNK):
+                here, guesses = (
+                    points[start : start + _CHUNK],
+                    values["state"][sources[start : start + _CHUNK]],
+                )
+                rows = gaits_at(grid.section_map, grid.points(here), guesses, threads)
+                good = rows["status"] == FOUND
+                for name, column in rows.items():
+                    values[name][here[good]] = column[good]
+                found.append(here[good])
+    return np.concatenate(found) if found else fresh[:0]
