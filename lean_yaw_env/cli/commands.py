@@ -12,18 +12,16 @@ import numpy as np
 import typer
 
 from lean_yaw_env.cli.records import as_json
-from lean_yaw_env.errors import LeanYawError
 from lean_yaw_env.files import require_ending
 from lean_yaw_env.parameters import Vector, WalkerParameters
 from lean_yaw_env.passive import PassiveWalker
 from lean_yaw_env.rendering.figures import ENDINGS, save_figure
+from lean_yaw_env.reporting import keep, reporting
 from lean_yaw_env.validation import require_count
 from lean_yaw_env.walker import Walker
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-WRONG_INPUT, NO_RESULT = 2, 1
 
 
 class Output(NamedTuple):
@@ -67,7 +65,11 @@ def add_command(
         @wraps(function)
         def command(as_json: bool, plot: Path | None = None, **options: Any) -> None:
             description = {key: options.pop(key) for key in described}
-            try:
+            with reporting("lean-yaw"):
+                if options.get("out") is not None:
+                    keep(
+                        f"what is finished is in {options['out']}; run the same command again to continue"
+                    )
                 if plot is not None:
                     require_ending(plot, ENDINGS)
                 if needs_walker:
@@ -75,11 +77,6 @@ def add_command(
                 output = function(**options)
                 if plot is not None and output.figure is not None:
                     save_figure(output.figure(), plot)
-            except (ValueError, OverflowError, OSError) as error:
-                _give_up(error, WRONG_INPUT)
-            except (LeanYawError, ImportError) as error:
-                _give_up(error, NO_RESULT)
-            else:
                 _print(output, as_json)
 
         options = [*own.values(), *described.values(), *([_PLOT] if draws else []), _AS_JSON]
@@ -93,11 +90,6 @@ def add_command(
 
 def _print(output: Output, json: bool) -> None:
     typer.echo(as_json(output.record)) if json else output.show()
-
-
-def _give_up(error: Exception, code: int) -> None:
-    typer.echo(f"lean-yaw: {error}", err=True)
-    raise typer.Exit(code) from error
 
 
 def walker_of(
