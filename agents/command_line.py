@@ -36,6 +36,10 @@ Tasks = Annotated[
     list[str] | None,
     Option("--task", help="The task's name, several separated by commas, or all. Heading by default."),
 ]  # fmt: skip
+EnvOption = Annotated[
+    list[str] | None,
+    Option("--option", help="An option of the environment as NAME=VALUE, for example random_body=training or hidden_rates=true. May be repeated."),
+]  # fmt: skip
 AsJson = Annotated[bool, Option("--json", help="Print JSON instead of tables.")]
 
 
@@ -60,18 +64,20 @@ def train(
     folder: Annotated[Path | None, Option("--run", help="The folder to resume, in place of the newest.")] = None,
     threads: Annotated[int | None, Option(help="Threads of torch and of the walkers; one is best for small networks, and used otherwise.")] = None,
     tensorboard: Annotated[bool, Option("--tensorboard", help="Write TensorBoard's logs into the run's folder.")] = False,
+    options: EnvOption = None,
 ) -> None:  # fmt: skip
-    """Train an agent on a task, compare it with random actions, the fixed controller and feedback, and write the results under runs/.
+    """Train an agent on a task, compare it with random actions, the fixed controller and feedback on validation episodes, and write the results under runs/.
 
     With --seeds, also draw all learning curves in one picture and print the spread of the results.
     """
     from .evaluation.row_tables import show
     from .learning.runs import run
     from .learning.series import is_series, run_series, seeds_table
+    from .options import env_options
 
     given = {
         "seed": seed, "steps": steps, "episodes": episodes, "threads": threads,
-        "algorithm": algorithm, "tensorboard": tensorboard or None,
+        "algorithm": algorithm, "tensorboard": tensorboard or None, "options": env_options(options) if options else None,
     }  # fmt: skip
     chosen = {name: value for name, value in given.items() if value is not None}
     place = _training_place(task, seeds, out, folder, chosen, resume)
@@ -119,16 +125,18 @@ def tune(
     agent: Annotated[str, Argument(help="feedback, lqr, mpc, ppo or sac.")],
     task: Annotated[str, Argument(help="The task's name.")],
     trials: Annotated[int, Option(help="Total number of trials, including those in the study already.")] = 100,
-    episodes: Annotated[int | None, Option(help="Episodes that settings are scored on; 128 for feedback and lqr, 24 for mpc, 512 for learners otherwise.")] = None,
+    episodes: Annotated[int | None, Option(help="Episodes that settings are scored on; 128 for feedback and lqr, 24 for mpc, 512 for learners "
+        "otherwise.")] = None,
     horizon: Annotated[float | None, Option(help="Length of these episodes, of controllers; the task's otherwise.")] = None,
     steps: Annotated[int | None, Option(help="Steps of each training, of learners; the task's own number otherwise.")] = None,
     repeats: Annotated[int, Option(help="Trainings of a trial, of learners, each of another seed.")] = 1,
     storage: Annotated[Path | None, Option(help="SQLite file that the study is kept in and gone on with; runs/tuning/AGENT-TASK.db otherwise.")] = None,
-    out: Annotated[Path | None, Option(help="JSON file for the best settings so far; beside the study's file otherwise. The package's own settings stay as they are: see ship.")] = None,
+    out: Annotated[Path | None, Option(help="JSON file for the best settings so far; beside the study's file otherwise. The package's own settings "
+        "stay as they are: see ship.")] = None,
 ) -> None:  # fmt: skip
     """Search for settings of a controller or a learner, beginning with those that come with the package, and print the best.
 
-    Trials are scored on episodes set aside for tuning. The same command continues an interrupted study.
+    Trials are scored on validation episodes. The same command continues an interrupted study.
     """
     from .tuning.study import Tuning, best_trial, result_words
     from .tuning.study import tune as run_trials
@@ -153,7 +161,8 @@ def tune(
 @app.command()
 @reported("ship")
 def ship(
-    sources: Annotated[list[Path], Argument(metavar="SOURCE...", help="Folders of finished runs or series of them, or files of best settings that tune left.")],
+    sources: Annotated[list[Path], Argument(metavar="SOURCE...", help="Folders of finished runs or series of them, or files of best settings "
+        "that tune left.")],
     replace: Annotated[bool, Option("--replace", help="Replace what is there already.")] = False,
 ) -> None:  # fmt: skip
     """Put trained policies and tuned settings among those that come with the package."""
@@ -173,28 +182,43 @@ def evaluate(
     task: Tasks = None,
     episodes: Annotated[int, Option(help="Episodes of each agent, for each of its trainings; the same for all.")] = 1000,
     costly_episodes: Annotated[int, Option(help="Largest number of episodes for agents that plan at every step (mpc).")] = 40,
-    seed: Annotated[int, Option(help="Seed of the evaluation episodes. No training uses these episodes.")] = 0,
+    seed: Annotated[int, Option(help="Seed of the episodes. No training uses them.")] = 0,
+    options: EnvOption = None,
     agent_path: AgentPath = None,
     runs: Runs = Path("runs"),
     cache: Annotated[Path | None, Option(help="Folder in which finished episodes are kept, so that an interrupted evaluation can continue; evaluations "
         "below --runs for several tasks.")] = None,
     processes: Annotated[int | None, Option(help="Processes that walk; as many as cores by default.")] = None,
-    out: Annotated[Path | None, Option(help="Write the leaderboard into this folder: page, numbers, plots and pictures; of trained agents, those of the package.")] = None,
-    pictures: Annotated[Path | None, Option(help="Only draw the agents' footprints on the first episode of each task, into this folder.")] = None,
+    out: Annotated[Path | None, Option(help="Write the leaderboard, on the test episodes, into this folder: page, numbers, plots and pictures; of trained agents, those of the package.")] = None,
+    results: Annotated[Path | None, Option(help="Also write every episode into this folder, a JSON file for each task and agent.")] = None,
+    others: Annotated[list[Path] | None, Option(help="A file that --results wrote elsewhere: its agent enters the leaderboard of --out. May be repeated.")] = None,
+    pictures: Annotated[Path | None, Option(help="Only draw the agents' footprints on the first validation episode of each task, into this folder.")] = None,
     as_json: Annotated[bool, Option("--json", help="Print rows as JSON instead of tables.")] = False,
 ) -> None:  # fmt: skip
-    """Run agents through the same seeded episodes and print interquartile means with 95 % intervals, survival beside error."""
-    from .evaluation.comparison import by_task, compared_rows
+    """Run agents through the same validation episodes and print means with 95 % intervals; with --out, write the leaderboard on the test episodes.
+
+    --agent-path is the folder of a run, or of an agent of your own: see docs/enter_your_agent.md.
+    """
+    from .evaluation.comparison import by_task, compared_rows, rivals_of
     from .evaluation.leaderboard import make_leaderboard, save_footprints
     from .evaluation.plan import Evaluation
+    from .evaluation.results_files import read_results, write_results
     from .evaluation.row_tables import show
+    from .options import env_options
 
+    if out is not None and options:
+        raise ValueError(
+            "option must not be given with --out: a leaderboard is of the tasks as they are"
+        )
+    if out is None and others:
+        raise ValueError("others must not be given without --out: they enter a leaderboard")
     given = names_in([*(agents or []), *(more_agents or [])])
     tasks = tasks_in(task or ["Heading"])
     evaluation = Evaluation(
         episodes=episodes,
         costly_episodes=costly_episodes,
         seed=seed,
+        options=env_options(options or ()),
         path=agent_path,
         runs=None if out is not None and agent_path is None else runs,
         cache=runs / CACHE if cache is None and (out or len(tasks) > 1) else cache,
@@ -208,9 +232,15 @@ def evaluate(
         save_footprints(candidates, pictures, seed=seed)
         return
     if out is None:
-        rows = compared_rows(by_task(evaluation.run(candidates)), evaluation.processes)
+        found = evaluation.run(candidates)
+        compared = by_task(found)
+        rows, _ = compared_rows(compared, rivals_of(compared), evaluation.processes)
     else:
-        rows = make_leaderboard(candidates, evaluation, out, command_as_typed())
+        entered = [read_results(file, "test", seed) for file in others or ()]
+        rows, found = make_leaderboard(candidates, evaluation, out, command_as_typed(), entered)
+    if results is not None:
+        for each in found:
+            write_results(each, results, "validation" if out is None else "test", seed)
     show(rows, Console(), as_json=as_json)
 
 
@@ -235,6 +265,39 @@ def tasks_in(given: Iterable[str]) -> list[str]:
 def command_as_typed() -> str:
     """The command line, as a page quotes it."""
     return shlex.join(["python", "-m", str(__package__), *sys.argv[1:]])
+
+
+@app.command()
+@reported("robustness")
+def robustness(
+    task: Tasks = None,
+    agents: Annotated[str, Option(help="Agents, separated by commas, or all.")] = ALL,
+    episodes: Annotated[int, Option(help="Episodes of each agent under each variation, for each of its trainings.")] = 200,
+    costly_episodes: Annotated[int, Option(help="Largest number of episodes for agents that plan at every step (mpc).")] = 20,
+    seed: Annotated[int, Option(help="Seed of the validation episodes.")] = 0,
+    agent_path: AgentPath = None,
+    runs: Runs = Path("runs"),
+    processes: Annotated[int | None, Option(help="Processes that walk; as many as cores by default.")] = None,
+    out: Annotated[Path, Option(help="Folder for robustness.md, robustness.csv and images/robustness.png.")] = Path("docs"),
+) -> None:  # fmt: skip
+    """Run agents, made for the tasks as they are, under noise, delay, hidden rates, other bodies, pushes, slopes and friction."""
+    from .evaluation.plan import Evaluation
+    from .evaluation.robustness import robustness_rows, write_robustness
+
+    evaluation = Evaluation(
+        episodes=episodes,
+        costly_episodes=costly_episodes,
+        seed=seed,
+        path=agent_path,
+        runs=None if agent_path is None else runs,
+        cache=runs / CACHE,
+        processes=processes or os.cpu_count() or 1,
+    )
+    keep(f"finished episodes are in {evaluation.cache}; {AGAIN}")
+    names = names_in([agents])
+    candidates = evaluation.candidates(tasks_in(task or ["Heading"]), [] if ALL in names else names)
+    rows = robustness_rows(candidates, evaluation)
+    typer.echo(f"written: {write_robustness(rows, out, command_as_typed())}")
 
 
 @app.command("closed-loop")
@@ -269,6 +332,34 @@ def closed_loop(
     if out is not None and reports:
         page = write_report(reports, out, command_as_typed(), notes)
         typer.echo(f"written: {page}", err=True)
+
+
+@app.command("capture")
+@reported("capture")
+def capture(
+    task: Tasks = None,
+    agents: Annotated[str, Option(help="Agents, separated by commas; those that plan, remember or draw are left out.")] = "fixed,feedback,lqr,ppo",
+    out: Annotated[Path | None, Option(help="Folder for capture.csv and images/capture_*.png.")] = None,
+    agent_path: AgentPath = None,
+    runs: Runs = Path("runs"),
+    starts: Annotated[int, Option(help="In the box of starts.")] = 1024,
+    points: Annotated[int, Option(help="To a side of the picture's plane.")] = 61,
+    friction_limit: Annotated[float, Option(help="Largest ratio of tangential to normal force; inf is the tasks' own.")] = float("inf"),
+    as_json: AsJson = False,
+) -> None:  # fmt: skip
+    """Hold agents against what can be saved: an exhaustive search over two chosen steps, each followed by the paper's controller."""
+    from .evaluation.capture import examine_captures, show, write_captures
+
+    reports, notes = examine_captures(
+        tasks_in(task or ["Push"]), names_in([agents]), path=agent_path, runs=runs,
+        starts=starts, points=points, friction_limit=friction_limit,
+    )  # fmt: skip
+    if as_json:
+        typer.echo(dumps([row for each in reports for row in each.rows()], indent=2))
+    else:
+        show(reports, notes)
+    for path in write_captures(reports, out) if out is not None and reports else ():
+        typer.echo(f"written: {path}", err=True)
 
 
 @app.command()

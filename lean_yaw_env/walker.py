@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from enum import Enum
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.errors import FellError, SolverError
-from lean_yaw_env.files import require_ending, write_json
+from lean_yaw_env.files import json_text, require_ending, write_json
 from lean_yaw_env.kernel import records
 from lean_yaw_env.kernel.records import Body, Command, Outcome
 from lean_yaw_env.kernel.step import step as step_kernel
@@ -35,6 +35,9 @@ from lean_yaw_env.validation import (
     require_number,
     require_one_or_each,
 )
+
+if TYPE_CHECKING:
+    from lean_yaw_env.viewer import PageDisplay
 
 SIDE: dict[Foot, float] = {"left": 1.0, "right": -1.0}
 OTHER_FOOT: dict[Foot, Foot] = {"left": "right", "right": "left"}
@@ -169,8 +172,16 @@ class Walk(BaseWalk):
         ValueError
             If the path has another ending, or its folder does not exist.
         """
-        place = require_ending(path, (".json",))
-        saved = {
+        write_json(require_ending(path, (".json",)), self._saved())
+
+    def show(self, height: int = 620) -> PageDisplay:
+        """The walk on the web page, for a notebook, which shows what a cell's last line returns; ``height`` is in pixels."""
+        from lean_yaw_env.viewer.notebook import PageDisplay  # few programs need it
+
+        return PageDisplay(json_text(self._saved()), height)
+
+    def _saved(self) -> dict[str, Any]:
+        return {
             "format": "lean-yaw-walk",
             "version": 1,
             "parameters": asdict(self.parameters),
@@ -180,7 +191,6 @@ class Walk(BaseWalk):
             "commanded_offsets": self.commands[:, 1].tolist(),
             "mass_offsets": self.mass_offsets.tolist(),
         }
-        write_json(place, saved)
 
 
 @dataclass(frozen=True)

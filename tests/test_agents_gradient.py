@@ -13,7 +13,7 @@ from agents import load, save
 from agents.controllers.simple import FixedController
 from agents.evaluation.scoring import run_seeds
 from agents.learning.algorithms import settings_for, train
-from agents.learning.apg import GradientSettings, make_policy
+from agents.learning.apg import GradientSettings, perceptron
 from agents.learning.differentiable import (
     DifferentiableWalkers,
     Steps,
@@ -131,7 +131,7 @@ def test_gradient_through_a_window_of_a_task_agrees_with_central_differences(tas
 
 def test_gradient_by_a_policy_s_weights_agrees_with_central_differences():
     generator = torch.Generator().manual_seed(1)
-    policy = make_policy(7, 2, (8,), generator).double()
+    policy = perceptron(7, (8,), 2, 0.01, generator).double()
     direction = [torch.randn(w.shape, generator=generator).double() for w in policy.parameters()]
 
     def total(along):

@@ -26,14 +26,14 @@ def test_the_motion_between_heel_strikes_joins_the_episodes_states():
     _, info = env.reset(seed=first_seed("validation", 0))
     for step in steps:
         assert np.array_equal(step.scene.pose.state, info["state"])
-        assert step.pitch[0] == pytest.approx(info["state"][1], abs=1e-12)
+        assert step.motion.pose(0.0).state[1] == pytest.approx(info["state"][1], abs=1e-12)
         assert step.push is None or np.isfinite(step.push).all()
         _, _, _, _, info = env.step(np.zeros(2, dtype=np.float32))
         assert step.end == pytest.approx(info["time"], rel=1e-12)
     assert steps[-2].end < 8.0 <= steps[-1].end
     # the path within a step ends where the next one's begins: the hips do not jump at heel strike
     for before, after in pairwise(steps):
-        assert np.allclose(before.centre[-1], after.centre[0], atol=1e-6)
+        assert np.allclose(before.motion.path()[-1], after.motion.path()[0], atol=1e-6)
 
 
 def test_pushes_are_told_in_standard_deviations_of_the_task():

@@ -81,7 +81,7 @@ def test_environments_take_the_ids_that_gymnasium_takes(kind) -> None:
 
 
 def test_a_misspelt_option_names_its_neighbour() -> None:
-    with pytest.raises(TypeError, match="option 'slop' is unknown; did you mean 'slope'"):
+    with pytest.raises(TypeError, match="unexpected keyword argument 'slop'; did you mean 'slope'"):
         gym.make("LeanYaw/Heading-v0", slop=0.01)
 
 

@@ -594,11 +594,11 @@ def test_pictures_show_goals_and_the_path() -> None:
     for _ in range(6):
         env.step(ZERO)
         footage.extend()
-    goals = footage.scene(None).goals
+    goals = footage.scene().goals
     assert [goal.reached for goal in goals] == [True, False]
     assert goals[0][:3] == (1.5, 0.0, waypoints.RADIUS)
     env = WalkerEnv("Slalom")
     env.reset(seed=0)
-    scene = Footage(env.simulation).scene(None)
+    scene = Footage(env.simulation).scene()
     assert scene.reference_path is not None
     assert np.array_equal(scene.reference_path, slalom.reference_path(*env.simulation.records(0)))

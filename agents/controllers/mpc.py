@@ -19,6 +19,7 @@ from lean_yaw_env.parameters import Vector
 from lean_yaw_env.validation import require_number
 
 from ..agent import Agent, State
+from ..observations import ObservationLayout
 from ..settings import tuned
 from .guidance import guided
 from .mpc_rollouts import Rollouts
@@ -55,6 +56,7 @@ class MpcController:
     ) -> None:
         self._task = task
         self._options = EnvOptions() if options is None else options
+        self._layout = ObservationLayout.of(task, self._options)
         self._settings = tuned("mpc", task, MpcSettings()) if settings is None else settings
         self._seed = int(require_number("seed", seed, 0, 2**63))
         self._base = _regulator(task, self._options) if base is None else base
@@ -91,7 +93,7 @@ class MpcController:
     ) -> tuple[NDArray[np.float32], State]:
         """Actions of the best plans found, which are the new state; see ``Agent.predict``.
 
-        Of the observation only the shape is used: the environment is read.
+        Of the observation only the shape is used, and checked: the environment is read.
 
         Raises
         ------
@@ -103,10 +105,11 @@ class MpcController:
         simulation, rollouts = self._simulation, self._rollouts
         if simulation is None or rollouts is None:
             raise RuntimeError("attach(env) must be called before predict: plans are tried on it")
-        shape = np.shape(observation)[:-1]
-        if int(np.prod(shape)) != simulation.n or not np.ndim(observation):
+        seen = self._layout.require(observation)
+        shape = seen.shape[:-1]
+        if int(np.prod(shape)) != simulation.n:
             raise ValueError(
-                f"observation must hold one for each of {simulation.n} walkers, got {np.shape(observation)}"
+                f"observation must hold one for each of {simulation.n} walkers, got {seen.shape}"
             )
         starts = np.ones(simulation.n, dtype=np.bool_)
         left = np.zeros((simulation.n, self._settings.horizon, ACTION_SIZE))

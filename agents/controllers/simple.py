@@ -17,7 +17,7 @@ from lean_yaw_env.parameters import STATE_FIELDS, Vector
 from lean_yaw_env.validation import require_finite
 
 from ..agent import State
-from ..observations import ObservationLayout
+from ..observations import ObservationLayout, require_observation
 from ..settings import tuned
 from .gaits import Pumping
 
@@ -47,32 +47,43 @@ class MemorylessController:
 
 
 class FixedController(MemorylessController):
-    """The paper's controller: inter-leg angle 0.3, no mass offset, whatever happens."""
+    """The paper's controller: inter-leg angle 0.3, no mass offset, whatever happens.
+
+    With a ``layout`` it refuses observations of another shape.
+    """
+
+    def __init__(self, layout: ObservationLayout | None = None) -> None:
+        self._layout = layout
 
     def _actions(self, observation: Any) -> NDArray[np.float32]:
-        return np.zeros(_action_shape(observation), dtype=np.float32)
+        return np.zeros(_action_shape(observation, self._layout), dtype=np.float32)
 
 
 class RandomController(MemorylessController):
     """Draws every action uniformly from the whole action space, also if asked for deterministic ones.
 
-    The same seed, a whole number from 0 on, draws the same actions.
+    The same seed, a whole number from 0 on, draws the same actions. With a ``layout`` it refuses observations of another shape.
     """
 
-    def __init__(self, seed: int = 0) -> None:
+    def __init__(self, seed: int = 0, layout: ObservationLayout | None = None) -> None:
         self._generator = np.random.default_rng(seed)
+        self._layout = layout
 
     def _actions(self, observation: Any) -> NDArray[np.float32]:
-        shape = _action_shape(observation)
+        shape = _action_shape(observation, self._layout)
         return self._generator.uniform(-1.0, 1.0, shape).astype(np.float32)
 
 
-def _action_shape(observation: ArrayLike | Mapping[str, ArrayLike]) -> tuple[int, ...]:
-    own = observation["observation"] if isinstance(observation, Mapping) else observation
-    shape = np.shape(own)
-    if not shape:
-        raise ValueError(f"observation must have shape (..., features), got {shape}")
-    return (*shape[:-1], ACTION_SIZE)
+def _action_shape(
+    observation: ArrayLike | Mapping[str, ArrayLike], layout: ObservationLayout | None
+) -> tuple[int, ...]:
+    if layout is not None:
+        seen = layout.require(observation)
+    elif isinstance(observation, Mapping):
+        seen = require_observation(observation["observation"])
+    else:
+        seen = require_observation(observation)
+    return (*seen.shape[:-1], ACTION_SIZE)
 
 
 def as_actions(angle_change: Vector, offset: Vector, options: EnvOptions) -> NDArray[np.float32]:

@@ -1,140 +1,168 @@
-"""Which agent is better: comparisons on the same episodes, and whether the agents of a task come in the order that is expected of them."""
+"""Which agent is better: comparisons on the same episodes, and claims whose p-values are corrected for how many there are."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from lean_yaw_env.envs.tasks import task_named
 
-from ..registry import agent_entry
+from ..registry import AGENTS
 from .episodes import Results, Row, direction, is_share, metric_row
-from .intervals import UNDEFINED, Estimate
+from .intervals import CONFIDENCE, UNDEFINED, Estimate, holm
 
 Verdict = Literal["better", "worse", "tie", "mixed"]
-_VERDICTS: dict[int, Verdict] = {1: "better", -1: "worse", 0: "tie"}
 ResultsByAgent = Mapping[str, Results]
 """Of one task."""
+Rivals = Mapping[str, str | None]
+"""By task, the feedback controller that agents are compared with; None where there is none."""
+ENTERED = "entered"
+"""Kind of an agent that is not of this package."""
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """How an agent does against another in a metric, on the episodes that both have walked."""
-
-    agent: str
-    other: str
-    metric: str
-    mean: Estimate
-    """The agent's mean less the other's."""
-    iqm: Estimate
-    """The same of interquartile means; NaN for a share."""
-    verdict: Verdict
-    """``better`` or ``worse`` by the mean, which counts every fall, if the interval of its difference leaves out zero, and ``tie`` otherwise;
-    ``mixed`` if the interquartile means say the opposite."""
-    episodes: int
-
-
-def compare(first: Results, second: Results, metric: str) -> Comparison:
-    """Compare two agents in a metric that has a direction."""
-    episodes = min(first.episodes, second.episodes)
-    difference = first.resampled(metric, episodes).less(second.resampled(metric, episodes))
-    mean = difference.mean_estimate()
-    iqm = UNDEFINED if is_share(first.task, metric) else difference.iqm_estimate()
-    by_mean, by_iqm = (direction(first.task, metric) * _sign(each) for each in (mean, iqm))
-    verdict = "mixed" if by_mean * by_iqm < 0 else _VERDICTS[by_mean]
-    return Comparison(first.agent, second.agent, metric, mean, iqm, verdict, episodes)
-
-
-def _sign(difference: Estimate) -> int:
-    return int(difference.low > 0.0) - int(difference.high < 0.0)
-
-
-def by_agent(results: Sequence[Results]) -> dict[str, Results]:
-    """The agents of one task by name, ready to be compared: the trainings of each are drawn by themselves."""
-    return {each.agent: replace(each, stream=k) for k, each in enumerate(results)}
+def kind_of(agent: str) -> str:
+    """The kind of an agent of the registry, or ``ENTERED``."""
+    return AGENTS[agent].kind if agent in AGENTS else ENTERED
 
 
 def by_task(results: Sequence[Results]) -> dict[str, dict[str, Results]]:
-    """Results by task and agent, ready to be compared."""
+    """Results by task and agent."""
     return {
-        task: by_agent([each for each in results if each.task == task])
+        task: {each.agent: each for each in results if each.task == task}
         for task in dict.fromkeys(each.task for each in results)
     }
 
 
-def compared_rows(results: Mapping[str, ResultsByAgent], threads: int = 1) -> list[Row]:
-    """Rows of every task, its agents compared with one another; numpy's loops let threads share the tasks."""
-    with ThreadPoolExecutor(threads) as pool:
-        return [row for rows in pool.map(task_rows, results.values()) for row in rows]
-
-
 def best_feedback(results: ResultsByAgent) -> str | None:
     """The feedback controller with the best mean of the task's headline; None if there is none."""
-    names = [name for name in results if agent_entry(name).kind == "feedback"]
+    names = [name for name in results if kind_of(name) == "feedback"]
     if not names:
         return None
     task = results[names[0]].task
     headline = task_named(task).headline
-    sign = direction(task, headline)
-    return max(names, key=lambda name: sign * results[name].resampled(headline).mean)
+    means = {name: float(np.nanmean(results[name].values(headline))) for name in names}
+    return max(names, key=lambda name: direction(task, headline) * means[name])
 
 
-def task_rows(results: ResultsByAgent) -> list[Row]:
-    """A row for each metric of each agent, compared with the best feedback controller where there is one.
-
-    What some episodes leave undefined, as the time to settle of an agent that never settles, is no ground to compare on.
-    """
-    rival = best_feedback(results)
-    rows: list[Row] = []
-    for name, mine in results.items():
-        for metric in mine.metrics:
-            row = metric_row(mine, metric)
-            if rival not in (None, name) and _is_comparable(metric, mine, results[rival]):
-                found = compare(mine, results[rival], metric)
-                value, low, high = found.mean
-                row = replace(
-                    row, against=rival, difference=value, difference_low=low, difference_high=high,
-                    verdict=found.verdict,
-                )  # fmt: skip
-            rows.append(row)
-    return rows
+def rivals_of(results: Mapping[str, ResultsByAgent]) -> dict[str, str | None]:
+    """Each task's best feedback controller."""
+    return {task: best_feedback(of_task) for task, of_task in results.items()}
 
 
-def _is_comparable(metric: str, *results: Results) -> bool:
-    return direction(results[0].task, metric) != 0 and all(
-        np.isfinite(each.values(metric)).all() for each in results
-    )
+class Comparison(NamedTuple):
+    """An agent less another in a metric, on the episodes that both have walked."""
+
+    mean: Estimate
+    """The difference of the means."""
+    iqm: Estimate
+    """The difference of the interquartile means; NaN for a share."""
+    p_value: float
+    """Two-sided, of the means being equal; no smaller than a sign test's can be on so few episodes."""
+    episodes: int
+
+
+def compare(first: Results, second: Results, metric: str) -> Comparison:
+    """Compare two agents in a metric."""
+    episodes = min(first.episodes, second.episodes)
+    difference = first.resampled(metric, episodes).less(second.resampled(metric, episodes))
+    iqm = UNDEFINED if is_share(first.task, metric) else difference.iqm_estimate()
+    p_value = max(difference.p_value(), 2.0 ** (1 - episodes))
+    return Comparison(difference.mean_estimate(), iqm, p_value, episodes)
 
 
 @dataclass(frozen=True)
-class Expectation:
-    """Whether one agent is better than another at a task, by its headline; ``comparison`` is None where one of them is missing."""
+class Claim:
+    """That one agent is better than another at a task, by the mean of its headline, which counts every fall."""
 
     task: str
-    worse: str
     better: str
-    comparison: Comparison | None
+    worse: str
+    comparison: Comparison
+    p_value: float
+    """Corrected for the number of claims."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """``better`` or ``worse`` if the corrected p-value is below 0.05, and ``tie`` otherwise; ``mixed`` if the interval of the difference of
+        the interquartile means lies on the other side of zero."""
+        if not self.p_value < 1.0 - CONFIDENCE:
+            return "tie"
+        sign = direction(self.task, task_named(self.task).headline)
+        mean, iqm = (sign * np.array(each) for each in (self.comparison.mean, self.comparison.iqm))
+        if mean[0] > 0.0:
+            return "mixed" if (iqm < 0.0).all() else "better"
+        return "mixed" if (iqm > 0.0).all() else "worse"
 
     @property
     def holds(self) -> bool:
-        return self.comparison is not None and self.comparison.verdict == "better"
+        return self.verdict == "better"
 
 
-def expectations_of(task: str, results: ResultsByAgent) -> list[Expectation]:
-    """Random below fixed, fixed below the best feedback controller, and that below whatever plans or has learned."""
-    rival = best_feedback(results)
-    pairs = [("random", "fixed")]
-    if rival is not None:
-        above = [name for name in results if agent_entry(name).kind in ("planner", "learned")]
-        pairs += [("fixed", rival), *((rival, name) for name in above)]
-    headline = task_named(task).headline
-    found: list[Expectation] = []
-    for worse, better in pairs:
-        is_there = worse in results and better in results
-        comparison = compare(results[better], results[worse], headline) if is_there else None
-        found.append(Expectation(task, worse, better, comparison))
-    return found
+def claims_of(
+    results: Mapping[str, ResultsByAgent], rivals: Rivals, threads: int = 1
+) -> list[Claim]:
+    """Every claim: the fixed controller against random actions, and every other agent against its task's rival, as the better one.
+
+    numpy's loops let threads share the comparisons.
+    """
+    pairs: list[tuple[str, str, str]] = []
+    for task, of_task in results.items():
+        rival = rivals.get(task)
+        if "random" in of_task and "fixed" in of_task:
+            pairs.append((task, "fixed", "random"))
+        if rival is not None and rival in of_task:
+            pairs += [(task, name, rival) for name in of_task if name != rival]
+
+    def compared(pair: tuple[str, str, str]) -> Comparison:
+        task, better, worse = pair
+        return compare(results[task][better], results[task][worse], task_named(task).headline)
+
+    with ThreadPoolExecutor(threads) as pool:
+        comparisons = list(pool.map(compared, pairs))
+    corrected = holm([each.p_value for each in comparisons])
+    return [
+        Claim(*pair, comparison, p_value)
+        for pair, comparison, p_value in zip(pairs, comparisons, corrected, strict=True)
+    ]
+
+
+def compared_rows(
+    results: Mapping[str, ResultsByAgent], rivals: Rivals, threads: int = 1
+) -> tuple[list[Row], list[Claim]]:
+    """A row for each metric of each agent, compared with the task's rival where there is one; and the claims.
+
+    What some episodes leave undefined, as the time to settle of an agent that never settles, is no ground to compare on.
+    """
+    claims = claims_of(results, rivals, threads)
+    against = {
+        (each.task, each.better): each for each in claims if each.worse == rivals.get(each.task)
+    }
+    everything = [each for of_task in results.values() for each in of_task.values()]
+
+    def rows_of(mine: Results) -> list[Row]:
+        rival = results[mine.task].get(rivals.get(mine.task) or "")
+        rows = [_compared(metric_row(mine, metric), mine, rival) for metric in mine.metrics]
+        claim, headline = against.get((mine.task, mine.agent)), task_named(mine.task).headline
+        if claim is None:
+            return rows
+        found = {"p_value": claim.p_value, "verdict": claim.verdict}
+        return [replace(row, **found) if row.metric == headline else row for row in rows]
+
+    with ThreadPoolExecutor(threads) as pool:
+        return [row for rows in pool.map(rows_of, everything) for row in rows], claims
+
+
+def _compared(row: Row, mine: Results, rival: Results | None) -> Row:
+    """The row with its difference from the rival's, where that means something."""
+    if rival is None or rival is mine or direction(row.task, row.metric) == 0:
+        return row
+    if not all(np.isfinite(each.values(row.metric)).all() for each in (mine, rival)):
+        return row
+    value, low, high = compare(mine, rival, row.metric).mean
+    return replace(
+        row, against=rival.agent, difference=value, difference_low=low, difference_high=high
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -13,7 +14,7 @@ from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import Vector
 
-from .intervals import UNDEFINED, Resampled, resample, share_estimate
+from .intervals import CLAIM_RESAMPLES, RESAMPLES, UNDEFINED, Resampled, resample, share_estimate
 
 RETURN = "return"
 SPEED = "speed"
@@ -25,7 +26,7 @@ class Episodes:
     """What came of an agent's episodes, in arrays of shape (episodes,)."""
 
     survived: NDArray[np.bool_]
-    """Whether the time limit and nothing else ended it."""
+    """Whether the time limit or a success ended it."""
     metrics: dict[str, Vector]
     """``return``, the task's metrics and ``speed`` (distance over time) by name; NaN where an episode leaves one undefined."""
 
@@ -48,8 +49,6 @@ class Results:
     options: EnvOptions = field(default_factory=EnvOptions)
     seconds: float = 0.0
     """Of one core that the episodes took."""
-    stream: int = 0
-    """Another for each agent of a comparison: see ``intervals.resample``."""
     _resampled: dict[tuple[str, int], Resampled] = field(
         default_factory=dict, repr=False, compare=False
     )
@@ -79,7 +78,11 @@ class Results:
         """Resamples of a metric's values in the first episodes, or all; drawn once."""
         count = self.episodes if episodes is None else episodes
         if (metric, count) not in self._resampled:
-            drawn = resample(self.values(metric)[:, :count], self.stream)
+            # an agent's trainings are drawn by themselves, alike whoever else is evaluated
+            stream = zlib.crc32(self.agent.encode())
+            is_claimed = metric == task_named(self.task).headline
+            resamples = CLAIM_RESAMPLES if is_claimed else RESAMPLES
+            drawn = resample(self.values(metric)[:, :count], stream, resamples)
             self._resampled[metric, count] = drawn
         return self._resampled[metric, count]
 
@@ -93,14 +96,15 @@ class Row:
     Attributes
     ----------
     mean, low, high : the mean, for a metric that is 0 or 1 the share, with its 95 % interval
-    survival : share of the episodes that nothing but the time limit ended
+    survival : share of the episodes that the time limit or a success ended
     episodes : of each training
     iqm, iqm_low, iqm_high : the interquartile mean with its 95 % interval; NaN for a share
     trainings : policies of as many trainings are pooled; 1 for what is not trained
     least_training, greatest_training : the lowest and the highest mean of a training
-    against : the agent it is compared with, on the episodes that both have walked
+    against : the feedback controller that it is compared with, on the episodes that both have walked
     difference, difference_low, difference_high : the mean less that agent's, with its 95 % interval; NaN where there is no comparison
-    verdict : "better", "worse", "tie" or "mixed": see ``comparison.Comparison``
+    p_value : of the difference being zero, of the task's headline only; corrected for the number of claims (Holm)
+    verdict : "better", "worse", "tie" or "mixed", by that p-value: see ``comparison.Claim``
     """
 
     task: str
@@ -121,6 +125,7 @@ class Row:
     difference: float = math.nan
     difference_low: float = math.nan
     difference_high: float = math.nan
+    p_value: float = math.nan
     verdict: str | None = None
 
 

@@ -11,34 +11,36 @@ from pathlib import Path
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.files import write_text
 
-from ..agent import Agent
 from ..policies.policy import package_versions
-from ..registry import AgentRequest, agent_entry, env_id_of, make_agent
+from ..registry import AGENTS
 from ..seeds import first_seed
-from .comparison import Expectation, ResultsByAgent, by_task, compared_rows, expectations_of
-from .episodes import RETURN, SURVIVAL, Results, Row, direction, is_share, metric_row
-from .intervals import CONFIDENCE, RESAMPLES
+from .comparison import ENTERED, Claim, best_feedback, by_task, compared_rows, kind_of
+from .episodes import SURVIVAL, Results, Row, direction, is_share, metric_row
+from .intervals import CLAIM_RESAMPLES, CONFIDENCE, RESAMPLES
 from .pictures import save_agents_footprints, save_leaderboard_plot, save_push_levels_plot
-from .plan import Candidate, Evaluation
-from .row_tables import bracketed, markdown_table, mean, rows_to_csv, typical
+from .plan import Candidate, Evaluation, make_candidate
+from .row_tables import bracketed, iqm, markdown_table, mean, rows_to_csv
 
 IMAGES = "images"
 LEVELS_TASK, LEVELS_METRIC = "Push", "survived_200_steps"
 """What is evaluated at other push levels too, by which metric."""
 LEVELS = (0.2, 0.4, 0.6, 0.8, 1.0)
+_RANKED = ("planner", "learned", ENTERED)
+"""Kinds that are expected to be better than the best feedback controller."""
 
 _READING = """\
-All agents walk the same episodes. No training and no tuning has used them. If an agent was trained several times, its trainings (those of the
-package) are pooled.
+All agents walk the same test episodes. No training, no tuning and no choice has used them: nothing but the command above reads them. If an
+agent was trained several times, its trainings (those of the package) are pooled.
 
-- **iqm** is the interquartile mean: the mean of the middle half of all episodes. It does not show what happens in fewer than a quarter of the
-  episodes, such as rare falls. The table therefore also gives the mean of the return.
-- **survival** is the share of episodes that only the time limit ended. Errors are averaged over the time before a fall; the error of an agent that
-  often falls means little without its survival.
-- Brackets contain {confidence:.0%} confidence intervals: bootstrap intervals ({resamples} resamples) for means, Wilson intervals for shares. The
-  bootstrap resamples the episodes and, if there are several, the trainings. Such an interval is valid for another training on other episodes.
-- **against** compares the mean of the task's main metric (in bold type) with that of the best feedback controller on the same episodes. It says
-  "better" or "worse" if the interval of the difference does not contain zero."""
+- The first number of each agent is the **mean** of the task's main metric, which counts every fall. Beside it stands **survival**, the share of
+  episodes that the time limit or a success ended, and the **iqm**, the interquartile mean: the mean of the middle half of all episodes, which does not show
+  what happens in fewer than a quarter of them. Errors are averaged over the time before a fall; the error of an agent that often falls means little.
+- Brackets contain {confidence:.0%} confidence intervals: bootstrap intervals ({resamples:,} resamples, {claim_resamples:,} of main metrics) for means,
+  Wilson intervals for shares. The bootstrap resamples the episodes and, if there are several, the trainings. Such an interval is valid for another
+  training on other episodes.
+- **against** compares the mean of the main metric with that of the best feedback controller on the same episodes. Which controller that is was
+  decided on the validation episodes, before the test episodes were read. "Better" and "worse" are claims whose p-values, corrected for the number of
+  all claims on this page by Holm's method, are below 0.05."""
 
 Levels = Mapping[float, Sequence[Row]]
 """By push level, a row for each agent."""
@@ -49,8 +51,11 @@ def make_leaderboard(
     evaluation: Evaluation,
     out: Path,
     command: str,
-) -> list[Row]:
+    others: Sequence[Results] = (),
+) -> tuple[list[Row], list[Results]]:
     """Evaluate agents at their tasks, and Push's at other levels, and write page, numbers and pictures into a folder.
+
+    Return the rows and the candidates' results at the tasks as they are.
 
     Parameters
     ----------
@@ -58,16 +63,23 @@ def make_leaderboard(
     evaluation : Evaluation
     out : folder, which is made if it is not there
     command : what is said to have made it
+    others : results of agents that somebody else has evaluated on these test episodes
 
     Raises
     ------
     ValueError
         If a number is bad, or an agent cannot be made.
     """
+    known = {(each.task, each.agent) for each in candidates}
+    for each in others:
+        if (each.task, each.agent) in known or each.agent in AGENTS:
+            raise ValueError(f"results must be of another agent, got some of {each.agent!r} again")
+    rivals = fixed_rivals(candidates, evaluation)
     evaluation = replace(evaluation, episode_set="test")
     found = evaluation.run([*candidates, *level_candidates(candidates)])
-    results = by_task(found[: len(candidates)])
-    rows = compared_rows(results, evaluation.processes)
+    own = found[: len(candidates)]
+    results = by_task([*own, *others])
+    rows, claims = compared_rows(results, rivals, evaluation.processes)
     levels = level_rows(found)
     images = out / IMAGES
     images.mkdir(parents=True, exist_ok=True)
@@ -83,8 +95,15 @@ def make_leaderboard(
         f"This page is generated by `{command}`. Do not edit it. The evaluation seed is {evaluation.seed}. "
         f"The episodes took {duration} on one core ({_machine()})."
     )
-    write_text(out / "leaderboard.md", leaderboard_page(rows, results, levels, made))
-    return rows
+    write_text(out / "leaderboard.md", leaderboard_page(rows, claims, levels, made))
+    return rows, own
+
+
+def fixed_rivals(candidates: Sequence[Candidate], evaluation: Evaluation) -> dict[str, str | None]:
+    """The feedback controller that each task's agents are compared with: the best one on the validation episodes."""
+    controllers = [each for each in candidates if kind_of(each.agent) == "feedback"]
+    found = by_task(replace(evaluation, episode_set="validation").run(controllers))
+    return {task: best_feedback(results) for task, results in found.items()}
 
 
 def level_candidates(
@@ -115,19 +134,12 @@ def save_footprints(candidates: Sequence[Candidate], images: Path, *, seed: int 
     for task in dict.fromkeys(candidate.task for candidate in candidates):
         present = [candidate for candidate in candidates if candidate.task == task]
         save_agents_footprints(
-            {candidate.agent: _first_agent(candidate, seed) for candidate in present},
+            {each.agent: make_candidate(each, each.folders[0], seed) for each in present},
             task,
             images / f"footprints_{task.lower()}.png",
             seed=first_seed("validation", seed),
             options=present[0].options,
         )
-
-
-def _first_agent(candidate: Candidate, seed: int) -> Agent:
-    """The agent; of several trainings the first."""
-    env_id, folder = env_id_of(candidate.task), candidate.folders[0]
-    request = AgentRequest(env_id, candidate.options, seed, folder, None)
-    return make_agent(candidate.agent, request)
 
 
 def _machine() -> str:
@@ -147,19 +159,21 @@ def _levels_to_csv(levels: Levels) -> str:
 
 
 def leaderboard_page(
-    rows: Sequence[Row], results: Mapping[str, ResultsByAgent], levels: Levels, made: str
+    rows: Sequence[Row], claims: Sequence[Claim], levels: Levels, made: str
 ) -> str:
     """The whole page; ``made`` says how it was made."""
+    reading = _READING.format(confidence=CONFIDENCE, resamples=RESAMPLES, claim_resamples=CLAIM_RESAMPLES)  # fmt: skip
     parts = [
         "# Leaderboard",
         made,
-        _READING.format(confidence=CONFIDENCE, resamples=RESAMPLES),
-        "[leaderboard.csv](leaderboard.csv) contains all numbers, also those of metrics without a preferred direction.",
+        reading,
+        "[leaderboard.csv](leaderboard.csv) contains all numbers, also those of metrics without a preferred direction. "
+        "[Enter your agent](enter_your_agent.md) says how an agent from elsewhere gets onto this page.",
         "![Main metric of each task with confidence intervals](images/leaderboard.png)",
         "## Comparisons",
-        *_comparisons([each for task in results for each in expectations_of(task, results[task])]),
+        *_comparisons(claims),
     ]
-    for task in results:
+    for task in dict.fromkeys(row.task for row in rows):
         parts += [
             f"## {task}",
             task_named(task).summary,
@@ -176,15 +190,17 @@ def leaderboard_page(
     return "\n\n".join(parts) + "\n"
 
 
-def _comparisons(expectations: Sequence[Expectation]) -> list[str]:
-    titles = ["task", "main metric", "comparison", "holds", "difference of means", "difference of iqm"]  # fmt: skip
+def _comparisons(claims: Sequence[Claim]) -> list[str]:
+    titles = ["task", "main metric", "comparison", "holds", "corrected p", "difference of means", "difference of iqm"]  # fmt: skip
+    expected = [each for each in claims if _is_expected(each)]
     lines = [
-        'Each comparison uses the task\'s main metric. "A < B" holds if the confidence interval of the difference of the means does not contain zero.',
-        markdown_table(titles, [_expectation_row(each) for each in expectations]),
+        'Each comparison uses the mean of the task\'s main metric. "A < B" holds if B is better with a corrected p-value below 0.05. '
+        f"The correction is for {len(claims)} claims: these and the comparisons of the remaining agents with the best feedback controller.",
+        markdown_table(titles, [_claim_row(each) for each in expected]),
     ]
-    names = dict.fromkeys(each.better for each in expectations)
-    for name in (each for each in names if agent_entry(each).kind in ("learned", "planner")):
-        mine = [each for each in expectations if each.better == name]
+    names = dict.fromkeys(each.better for each in expected)
+    for name in (each for each in names if kind_of(each) in _RANKED):
+        mine = [each for each in expected if each.better == name]
         holds = ", ".join(f"{each.task} ({each.worse})" for each in mine if each.holds)
         fails = ", ".join(f"{each.task} ({_why_not(each)})" for each in mine if not each.holds)
         lines.append(
@@ -194,59 +210,55 @@ def _comparisons(expectations: Sequence[Expectation]) -> list[str]:
     return lines
 
 
-def _expectation_row(expectation: Expectation) -> list[str]:
-    task, comparison = expectation.task, expectation.comparison
-    headline = task_named(task).headline.replace("_", " ")
-    said = [task, headline, f"{expectation.worse} < {expectation.better}"]
-    if comparison is None:
-        return [*said, "not evaluated", "", ""]
-    holds = "yes" if expectation.holds else f"no: {_why_not(expectation)}"
-    differences = (bracketed(each, signed=True) for each in (comparison.mean, comparison.iqm))
-    return [*said, holds, *differences]
+def _is_expected(claim: Claim) -> bool:
+    """Whether the better one is expected to be: not another feedback controller, nor a baseline against a feedback controller."""
+    return kind_of(claim.better) in _RANKED or claim.worse == "random"
 
 
-def _why_not(expectation: Expectation) -> str:
-    if expectation.comparison is None:
-        return "not evaluated"
+def _claim_row(claim: Claim) -> list[str]:
+    headline = task_named(claim.task).headline.replace("_", " ")
+    holds = "yes" if claim.holds else f"no: {_why_not(claim)}"
+    differences = (bracketed(each, signed=True) for each in claim.comparison[:2])
+    p_value = f"{claim.p_value:.2g}"
+    return [claim.task, headline, f"{claim.worse} < {claim.better}", holds, p_value, *differences]
+
+
+def _why_not(claim: Claim) -> str:
     words = {
-        "worse": f"{expectation.better} is worse than {expectation.worse}",
-        "tie": f"no significant difference from {expectation.worse}",
+        "worse": f"{claim.better} is worse than {claim.worse}",
+        "tie": f"no significant difference from {claim.worse}",
         "mixed": "mean and iqm disagree",
     }
-    return words[expectation.comparison.verdict]
+    return words[claim.verdict]
 
 
 def _task_table(task: str, rows: Sequence[Row]) -> str:
     headline = task_named(task).headline
-    metrics = [
+    others = [
         metric
         for metric in dict.fromkeys(row.metric for row in rows)
-        if direction(task, metric) and metric not in (RETURN, SURVIVAL)
+        if direction(task, metric) and metric not in (headline, SURVIVAL)
     ]
-    metrics.sort(key=lambda metric: metric != headline)
     cells = {(row.agent, row.metric): row for row in rows}
-    rival = next((row.against for row in rows if row.against is not None), None)
-    titles = ["agent", "kind", "trainings", "episodes", _title(task, RETURN), "return, mean"]
-    titles += [_title(task, metric) for metric in metrics]
-    titles += [SURVIVAL, f"against {rival}" if rival else "against"]
+    rival = next((row.against for row in rows if row.verdict), None)
+    titles = ["agent", "kind", "trainings", "episodes", f"**{_title(task, headline)}**"]
+    titles += [_title(task, SURVIVAL), "iqm", *(_title(task, metric) for metric in others)]
+    titles.append(f"against {rival}" if rival else "against")
     lines: list[list[str]] = []
     for agent in dict.fromkeys(row.agent for row in rows):
-        first, kind = cells[agent, RETURN], agent_entry(agent).kind
-        trainings = str(first.trainings) if kind == "learned" else ""
-        line = [agent, kind, trainings, str(first.episodes), bracketed(typical(first))]
-        line.append(bracketed(mean(first)))
-        line += [bracketed(typical(cells[agent, metric])) for metric in (*metrics, SURVIVAL)]
-        verdict = cells[agent, headline].verdict
-        lines.append([*line, verdict or ("reference" if agent == rival else "")])
+        main, kind = cells[agent, headline], kind_of(agent)
+        trainings = str(main.trainings) if kind in ("learned", ENTERED) else ""
+        line = [agent, kind, trainings, str(main.episodes), bracketed(mean(main))]
+        line += [bracketed(mean(cells[agent, SURVIVAL])), bracketed(iqm(main))]
+        line += [bracketed(mean(cells[agent, metric])) for metric in others]
+        lines.append([*line, main.verdict or ("reference" if agent == rival else "")])
     return markdown_table(titles, lines)
 
 
 def _title(task: str, metric: str) -> str:
-    words = metric.replace("_", " ")
-    kind = "share" if is_share(task, metric) else "iqm"
+    kind = "share" if is_share(task, metric) else "mean"
     arrow = "↑" if direction(task, metric) > 0 else "↓"
-    shown = f"**{words}**" if metric == task_named(task).headline else words
-    return f"{shown}, {kind} {arrow}"
+    return f"{metric.replace('_', ' ')}, {kind} {arrow}"
 
 
 def _levels_table(levels: Levels) -> str:
@@ -254,8 +266,5 @@ def _levels_table(levels: Levels) -> str:
     agents = dict.fromkeys(agent for agent, _ in cells)
     return markdown_table(
         ["agent", *(f"{level:g}" for level in levels)],
-        [
-            [agent, *(bracketed(typical(cells[agent, level])) for level in levels)]
-            for agent in agents
-        ],
+        [[agent, *(bracketed(mean(cells[agent, level])) for level in levels)] for agent in agents],
     )

@@ -22,7 +22,6 @@ from ..agent import Agent
 from ..registry import agent_colour
 from .episodes import Row, direction, is_share
 from .recording import RecordedEpisode, record_episode
-from .row_tables import typical
 
 PICTURED_STEPS = 120
 """Steps of an episode that are drawn: two or three commands, at a scale at which footprints can be told apart."""
@@ -50,8 +49,8 @@ def save_leaderboard_plot(rows: Sequence[Row], path: Path) -> None:
     for axes in places[len(tasks) :]:
         axes.set_axis_off()
     keys = (
-        ("o", "interquartile mean or share, 95 % interval", _INK),
-        ("o", "mean", "none"),
+        ("o", "mean, 95 % interval", _INK),
+        ("o", "interquartile mean", "none"),
         ("|", "lowest and highest mean of a training", _INK),
     )
     handles = [
@@ -66,11 +65,10 @@ def _draw_headline(axes: Axes, rows: Sequence[Row], task: str, headline: str) ->
     share = is_share(task, headline)
     for place, row in enumerate(rows):
         colour = agent_colour(row.agent)
-        value, low, high = typical(row)
-        axes.plot([low, high], [place, place], color=colour, linewidth=3.0, alpha=0.6, solid_capstyle="butt")  # fmt: skip
-        axes.plot(value, place, "o", color=colour, markersize=5, clip_on=False)
+        axes.plot([row.low, row.high], [place, place], color=colour, linewidth=3.0, alpha=0.6, solid_capstyle="butt")  # fmt: skip
+        axes.plot(row.mean, place, "o", color=colour, markersize=5, clip_on=False)
         if not share:
-            axes.plot(row.mean, place, "o", markerfacecolor="none", color=colour, markersize=8, clip_on=False)  # fmt: skip
+            axes.plot(row.iqm, place, "o", markerfacecolor="none", color=colour, markersize=8, clip_on=False)  # fmt: skip
         if row.trainings > 1:
             ends = [row.least_training, row.greatest_training]
             axes.plot(ends, [place, place], "|", color=colour, markersize=9)

@@ -12,7 +12,7 @@ import time
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -25,9 +25,11 @@ from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.files import written_whole
 from lean_yaw_env.validation import require_count
 
+from ..agent import Agent
 from ..policies.policy import package_versions
-from ..policies.policy_files import CARD_FILE, WEIGHTS_FILE, options_to_plain
+from ..policies.policy_files import CARD_FILE, WEIGHTS_FILE, load, options_to_plain
 from ..registry import (
+    AGENTS,
     AgentRequest,
     agent_entry,
     env_id_of,
@@ -36,6 +38,7 @@ from ..registry import (
     policy_folders,
 )
 from ..seeds import MOST_EPISODES, EpisodeSet, first_seed
+from .entries import is_entry, load_entry, read_entry
 from .episodes import Episodes, Results
 from .scoring import run_seeds
 
@@ -59,6 +62,10 @@ class Candidate:
     options: EnvOptions
     folders: tuple[Path | None, ...] = (None,)
     """Of its trained policies, one for each training; (None,) for an agent that is not trained."""
+    entry: Path | None = None
+    """Folder of an agent from outside the package."""
+    made_for: EnvOptions | None = None
+    """Options that the agent is made for, where they are other ones than the environment's."""
 
     def __post_init__(self) -> None:
         require_count("episodes", self.episodes, 1, MOST_EPISODES)
@@ -79,10 +86,9 @@ class _Chunk:
             "task": candidate.task,
             "agent": candidate.agent,
             "options": options_to_plain(candidate.options),
+            "made_for": candidate.made_for and options_to_plain(candidate.made_for),
             "seeds": [self.seeds.start, self.seeds.stop],
-            "policy": None
-            if self.folder is None
-            else _digest(self.folder / CARD_FILE, self.folder / WEIGHTS_FILE),
+            "policy": _policy_digest(candidate.entry, self.folder),
             "code": _code_digest(),
             "versions": package_versions(),
         }
@@ -118,7 +124,8 @@ class Evaluation:
     def candidates(self, tasks: Sequence[str], names: Sequence[str]) -> list[Candidate]:
         """Agents of the registry for tasks; all that there are for a task, in the registry's order, if none is named.
 
-        Of several tasks, an agent that is not for one is left out there; of one task that is an error.
+        Of several tasks, an agent that is not for one is left out there; of one task that is an error. ``path`` may be a policy's folder, which
+        then stands for its algorithm's agent, or an entry's, which is added.
 
         Raises
         ------
@@ -127,14 +134,25 @@ class Evaluation:
         """
         for name in names:
             agent_entry(name)
+        entry = read_entry(self.path) if self.path is not None and is_entry(self.path) else None
+        path = self.path if entry is None else None
+        own = None if path is None or names else load(path).card
         found: list[Candidate] = []
         for task in tasks:
-            request = AgentRequest(
-                env_id_of(task), self.options, seed=self.seed, path=self.path, runs=self.runs
-            )
-            there = names_for(request)
+            env_id = env_id_of(task)
+            request = AgentRequest(env_id, self.options, seed=self.seed, runs=self.runs)
+            of_folder = replace(request, path=path)
+            there = names_for(of_folder if names else request)
+            if own is not None and own.env_id == env_id:
+                there = tuple(dict.fromkeys((*there, own.algorithm)))
             chosen = [name for name in dict.fromkeys(names) if len(tasks) == 1 or name in there]
-            found += [self._candidate(name, task, request) for name in (chosen if names else there)]
+            for name in chosen if names else there:
+                is_own = own is not None and (name, env_id) == (own.algorithm, own.env_id)
+                found.append(self._candidate(name, task, of_folder if names or is_own else request))
+            if entry is not None and task in entry.tasks:
+                found.append(
+                    Candidate(task, entry.name, self.episodes, self.options, entry.trainings, entry.folder)
+                )  # fmt: skip
         return found
 
     def _candidate(self, name: str, task: str, request: AgentRequest) -> Candidate:
@@ -175,7 +193,7 @@ class Evaluation:
 
 
 def _plans(agent: str) -> bool:
-    return agent_entry(agent).kind == "planner"
+    return agent in AGENTS and AGENTS[agent].kind == "planner"
 
 
 def _gathered(
@@ -232,15 +250,22 @@ def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
         os.environ.update(before)
 
 
+def make_candidate(candidate: Candidate, folder: Path | None, seed: int = 0) -> Agent:
+    """The agent of one of a candidate's trainings; ``seed`` is for an agent that draws."""
+    if candidate.entry is not None and folder is not None:
+        return load_entry(candidate.entry, folder)
+    options = candidate.options if candidate.made_for is None else candidate.made_for
+    request = AgentRequest(env_id_of(candidate.task), options, seed, folder, runs=None)
+    return make_agent(candidate.agent, request)
+
+
 def _run_chunk(chunk: _Chunk, cache: Path | None) -> _Outcome:
     """Run a chunk and keep it."""
     candidate = chunk.candidate
     # an agent that draws draws anew for each chunk, so that chunks may be run in any order
-    env_id, options = env_id_of(candidate.task), candidate.options
-    request = AgentRequest(env_id, options, chunk.seeds.start, chunk.folder, runs=None)
-    agent = make_agent(candidate.agent, request)
+    agent = make_candidate(candidate, chunk.folder, chunk.seeds.start)
     begin = time.process_time()
-    episodes = run_seeds(agent, candidate.task, chunk.seeds, options=options)
+    episodes = run_seeds(agent, candidate.task, chunk.seeds, options=candidate.options)
     seconds = time.process_time() - begin
     if cache is not None:
         arrays: dict[str, Any] = {_METRIC + name: each for name, each in episodes.metrics.items()}
@@ -271,6 +296,14 @@ def _code_digest() -> str:
     files += [*own.glob("*.py"), *own.glob("*.json"), own / "evaluation" / "scoring.py"]
     files += [*(own / "controllers").rglob("*.py"), *(own / "policies").rglob("*.py")]
     return _digest(*sorted(files))
+
+
+def _policy_digest(entry: Path | None, folder: Path | None) -> str | None:
+    """A digest of a trained policy's files, or of an entry's; None for an agent that is not trained."""
+    if entry is not None:
+        files = sorted(each for each in entry.rglob("*") if each.is_file())
+        return _digest(*(each for each in files if "__pycache__" not in each.parts)) + str(folder)
+    return None if folder is None else _digest(folder / CARD_FILE, folder / WEIGHTS_FILE)
 
 
 @lru_cache(maxsize=256)

@@ -13,31 +13,21 @@ from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.pictures import Footage
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.parameters import Foot, Vector
+from lean_yaw_env.rendering.motion import StepMotion
 from lean_yaw_env.rendering.scene import Scene
-from lean_yaw_env.walker import Walker
 
 from ..agent import Agent, State, attach
-
-SAMPLES = 17
-"""Of the motion within a step."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedStep:
-    """A walking step with the motion within it, sampled at even times."""
+    """A walking step with the motion within it."""
 
     scene: Scene
     """At its start."""
     end: float
     """From the start of the record, in units of time."""
-    duration: float
-    pitch: Vector
-    ankle: Vector
-    offset: Vector
-    centre: Vector
-    """Of mass, shape (SAMPLES, 2): (downhill, right)."""
-    angles: tuple[float, float]
-    """Inter-leg angles before and now."""
+    motion: StepMotion
     push: tuple[float, float] | None
     """(Pitch rate, ankle rate) that the step started with, in standard deviations of the task's; None without pushes."""
 
@@ -71,8 +61,14 @@ class RecordedEpisode:
     @property
     def path(self) -> Vector:
         """The centre of mass, shape (m, 4): (time, downhill, 0, right)."""
-        times = np.concatenate([np.linspace(s.end - s.duration, s.end, SAMPLES) for s in self.steps])  # fmt: skip
-        downhill, right = np.concatenate([step.centre for step in self.steps]).T
+        paths = [step.motion.path() for step in self.steps]
+        times = np.concatenate(
+            [
+                np.linspace(step.end - step.motion.duration, step.end, len(path))
+                for step, path in zip(self.steps, paths, strict=True)
+            ]
+        )
+        downhill, right = np.concatenate(paths).T
         return np.column_stack([times, downhill, np.zeros_like(times), right])
 
     @property
@@ -101,64 +97,26 @@ def record_episode(
     env = WalkerEnv(task, **vars(EnvOptions() if options is None else options))
     observation, info = env.reset(seed=seed)
     attach(agent, env)
-    walker = Walker(env.simulation.body_parameters(0))  # a random body is drawn by the reset
     footage = Footage(env.simulation)
-    scene = footage.scene(None)
     steps: list[RecordedStep] = []
     state: State = None
     terminated = truncated = False
     now = 0.0
     while not (terminated or truncated) and len(steps) < most_steps and now < most_time:
-        before = info
+        scene, push = footage.scene(), _push(info, env)
         action, state = agent.predict(observation, state, np.array(not steps), True)
         observation, _, terminated, truncated, info = env.step(action)
-        steps.append(_recorded_step(env, walker, scene, before, info, now))
-        now = steps[-1].end
-        if info["fall"] == FallCode.NONE:
-            footage.extend()
-            scene = footage.scene(None)
+        footage.extend()
+        now += footage.motion.duration
+        steps.append(RecordedStep(scene, now, footage.motion, push))
     env.close()
     return RecordedEpisode(
-        tuple(steps), scene, env.task.heading_field is not None, FallCode(info["fall"]).word, bool(terminated)
+        tuple(steps), footage.scene(), env.task.heading_field is not None, FallCode(info["fall"]).word, bool(terminated)
     )  # fmt: skip
 
 
-def _recorded_step(
-    env: WalkerEnv,
-    walker: Walker,
-    scene: Scene,
-    before: dict[str, Any],
-    after: dict[str, Any],
-    now: float,
-) -> RecordedStep:
-    duration = max(float(after["duration"]), 1e-6)  # a fall at the start of a step lasts no time
-    motion = walker.stance_motion(
-        before["state"],
-        duration=duration,
-        samples=SAMPLES,
-        stance=scene.pose.stance,
-        inter_leg_angle=after["inter_leg_angle"],
-        mass_offset=after["commanded_offset"],
-        previous_offset=before["mass_offset"],
-    )
-    heading = float(before["state"][0])
-    cosine, sine = math.cos(heading), math.sin(heading)
-    ahead, right = motion["centre_x"], motion["centre_z"]
-    turned = np.column_stack([cosine * ahead + sine * right, cosine * right - sine * ahead])
-    settings, push = env.simulation.settings, None
-    if "pitch_push" in before:
-        push = (
-            float(before["pitch_push"] / settings["pitch_push"][0]),
-            float(before["ankle_push"] / settings["ankle_push"][0]),
-        )
-    return RecordedStep(
-        scene=scene,
-        end=now + duration,
-        duration=duration,
-        pitch=motion["stance_pitch"],
-        ankle=motion["ankle_angle"],
-        offset=motion["mass_offset"],
-        centre=before["footprint"] + turned,
-        angles=(float(before["inter_leg_angle"]), float(after["inter_leg_angle"])),
-        push=push,
-    )
+def _push(info: dict[str, Any], env: WalkerEnv) -> tuple[float, float] | None:
+    if "pitch_push" not in info:
+        return None
+    pitch, ankle = (float(info[name] / env.simulation.settings[name][0]) for name in ("pitch_push", "ankle_push"))  # fmt: skip
+    return pitch, ankle

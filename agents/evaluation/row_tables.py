@@ -13,7 +13,9 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from .episodes import RETURN, Row, is_share
+from lean_yaw_env.envs.tasks import task_named
+
+from .episodes import SURVIVAL, Row, is_share
 from .intervals import Estimate
 
 _WIDTH = 5  # agents in a table: so many fit a terminal of 80 columns
@@ -45,15 +47,17 @@ def rows_to_csv(rows: Sequence[Row]) -> str:
 
 
 def results_table(rows: Sequence[Row]) -> Table:
-    """A table of one task: a metric to a row, an agent to a column, each interquartile mean, or share, over its 95 % interval.
+    """A table of one task: a metric to a row, an agent to a column, each mean over its 95 % interval; the main metric, survival and the main
+    metric's interquartile mean come first.
 
-    Of the return the mean stands beside it. Below: what each agent is against the best feedback controller, by its means.
+    Below: what each agent is against the best feedback controller.
     """
     agents = list(dict.fromkeys(row.agent for row in rows))
     cells = {(row.agent, row.metric): row for row in rows}
     counts = sorted({row.episodes for row in rows}, reverse=True)
+    task = rows[0].task
     table = Table(
-        title=f"{rows[0].task}, {' or '.join(map(str, counts))} episodes: interquartile means, 95 % intervals",
+        title=f"{task}, {' or '.join(map(str, counts))} episodes: means, 95 % intervals",
         box=box.SIMPLE_HEAD,
         padding=(0, 0),
         pad_edge=False,
@@ -61,18 +65,22 @@ def results_table(rows: Sequence[Row]) -> Table:
     table.add_column("metric", width=16)  # five agents and it fit a terminal of 80 columns
     for agent in agents:
         table.add_column(agent, justify="right", no_wrap=True)
-    for metric in dict.fromkeys(row.metric for row in rows):
+
+    def add(metric: str, of: Callable[[Row], Estimate], words: str) -> None:
         found = [cells.get((agent, metric)) for agent in agents]
-        table.add_row(metric.replace("_", " "), *(_over_interval(row, typical) for row in found))
-        if metric == RETURN:
-            table.add_row("return, mean", *(_over_interval(row, mean) for row in found))
-    compared = [row for row in rows if row.against is not None]
-    if compared:
+        table.add_row(words, *("" if row is None else _over_interval(of(row)) for row in found))
+
+    headline = task_named(task).headline
+    metrics = dict.fromkeys([headline, SURVIVAL, *(row.metric for row in rows)])
+    for metric in metrics:
+        add(metric, mean, metric.replace("_", " "))
+        if metric == SURVIVAL and not is_share(task, headline):
+            add(headline, iqm, f"{headline.replace('_', ' ')}, iqm")
+    rival = next((row.against for row in rows if row.verdict), None)
+    if rival is not None:
         table.add_section()
-    for metric in dict.fromkeys(row.metric for row in compared):
-        found = [cells.get((agent, metric)) for agent in agents]
-        verdicts = (row.verdict or "" if row is not None else "" for row in found)
-        table.add_row(f"{metric.replace('_', ' ')}\nagainst {compared[0].against}", *verdicts)
+        verdicts = {row.agent: row.verdict for row in rows if row.verdict}
+        table.add_row(f"against {rival}", *(verdicts.get(agent, "") for agent in agents))
     return table
 
 
@@ -81,17 +89,13 @@ def mean(row: Row) -> Estimate:
     return Estimate(row.mean, row.low, row.high)
 
 
-def typical(row: Row) -> Estimate:
-    """A row's interquartile mean with its interval; of a share the share."""
-    if is_share(row.task, row.metric):
-        return mean(row)
+def iqm(row: Row) -> Estimate:
+    """A row's interquartile mean with its interval; undefined for a share."""
     return Estimate(row.iqm, row.iqm_low, row.iqm_high)
 
 
-def _over_interval(row: Row | None, of: Callable[[Row], Estimate]) -> str:
-    if row is None:
-        return ""
-    value, low, high = of(row)
+def _over_interval(found: Estimate) -> str:
+    value, low, high = found
     return "undefined" if math.isnan(value) else f"{number(value)}\n{number(low)}–{number(high)}"
 
 

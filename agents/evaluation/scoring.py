@@ -118,9 +118,11 @@ def _run_chunk(
         now = starts & ~ended
         if now.any():
             # the default autoreset mode keeps an ended episode's memory until the next step
-            for name, values in _metrics(env.simulation, now).items():
+            found = _metrics(env.simulation, now)
+            for name, values in found.items():
                 metrics[name][now] = values
-            survived[now] = truncated[now]
+            # a success may end an episode too
+            survived[now] = truncated[now] | (found.get("is_success", np.zeros(1)) > 0.0)
             ended |= now
             if progress is not None:
                 progress(int(now.sum()))

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.rendering.filming import SECONDS_PER_TIME_UNIT, FilmFile, Frame, swing_angle
-from lean_yaw_env.rendering.geometry import Pose
+from lean_yaw_env.rendering.filming import FilmFile, Frame
+from lean_yaw_env.rendering.motion import SECONDS_PER_TIME_UNIT
 from lean_yaw_env.rendering.palette import ANKLE_AXIS, FAINT_INK, FLOOR, INK
 from lean_yaw_env.rendering.pygame_renderer import Renderer
 from lean_yaw_env.rendering.scene import Scene
@@ -20,9 +20,8 @@ from lean_yaw_env.validation import require_number
 from ..agent import Agent
 from ..registry import AgentRequest, agent_entry, env_id_of, make_agent, names_for
 from ..seeds import first_seed
-from .recording import SAMPLES, RecordedEpisode, record_episode
+from .recording import RecordedEpisode, record_episode
 
-SWING_SHARE = 0.6
 STAND_INS = ("lqr", "feedback", "fixed")
 """Who is filmed where there is no trained agent, the first that is for the task."""
 DIAL_RADIUS = 22.0
@@ -96,24 +95,12 @@ def _scene_at(
     steps, last = episode.steps, len(episode.steps) - 1
     i = min(bisect_right(steps, time, key=lambda step: step.end), last)
     step = steps[i]
-    share = min(1.0 + (time - step.end) / step.duration, 1.0)
-    place = share * (SAMPLES - 1)
-    grid = np.arange(SAMPLES)
-    pitch, ankle, offset = (
-        float(np.interp(place, grid, values)) for values in (step.pitch, step.ankle, step.offset)
-    )
-    pose = Pose(
-        state=np.array([step.scene.pose.state[0], pitch, ankle, 0.0, 0.0]),
-        stance=step.scene.pose.stance,
-        inter_leg_angle=swing_angle(np.array(step.angles), 1, share, SWING_SHARE) if i else step.angles[1],
-        mass_offset=offset,
-        contact=step.scene.pose.contact,
-    )  # fmt: skip
-    walked = [earlier.centre for earlier in steps[:i]]
-    path = np.vstack([*walked, step.centre[: math.floor(place) + 1]])
+    share = min(1.0 + (time - step.end) / step.motion.duration, 1.0)
+    walked = [earlier.motion.path() for earlier in steps[:i]]
+    path = np.vstack([*walked, step.motion.path(share)])
     now = f"falls: {episode.fall}" if episode.fall and i == last else f"time {time:.0f}"
     lines = (name, now) if name else (now,)  # more of them would hide the walker of a small picture
-    return replace(step.scene, pose=pose, path=path, lines=lines), step.push
+    return replace(step.scene, pose=step.motion.pose(share), path=path, lines=lines), step.push
 
 
 def agent_for(name: str, task: str, runs: Path, path: Path | None = None) -> tuple[str, Agent]:

@@ -68,6 +68,10 @@ class GradientSettings(LearnerSettings):
     exploration: float = 0.05
     largest_gradient: float = 1.0
 
+    @property
+    def update_steps(self) -> int:
+        return self.walkers * self.window
+
     def __post_init__(self) -> None:
         super().__post_init__()
         self.require_counts("window", "critic_epochs", "critic_batches")
@@ -75,10 +79,9 @@ class GradientSettings(LearnerSettings):
         self.require_shares("critic_memory", "trace")
         self.require_positive("critic_learning_rate", "largest_gradient")
         require_number("exploration", self.exploration, 0.0, 10.0, "(]")
-        samples = self.walkers * self.window
-        if samples % self.critic_batches:
+        if self.update_steps % self.critic_batches:
             raise ValueError(
-                f"critic_batches must divide the {samples} samples of a window, got {self.critic_batches}"
+                f"critic_batches must divide the {self.update_steps} samples of a window, got {self.critic_batches}"
             )
 
 
@@ -106,7 +109,9 @@ class GradientLearner:
             task_of(env_id), walking, settings.walkers, threads=threads
         )
         features = self.walkers.reset(training_seed(seed)).shape[1]
-        self.policy = make_policy(features, ACTION_SIZE, settings.hidden, self.generator)
+        self.policy = perceptron(
+            features, settings.hidden, ACTION_SIZE, _LAST_LAYER, self.generator
+        )
         self.critic = perceptron(features, settings.hidden, 1, 1.0, self.generator)
         """What is still to be earned from an observation, in units of a rate of one over the time constant."""
         self.target = copy.deepcopy(self.critic).requires_grad_(False)
@@ -186,7 +191,7 @@ class GradientLearner:
             self.steps += self.settings.walkers
             steps.append(step)
             for i in torch.nonzero(step.terminated | step.truncated).flatten().tolist():
-                row = (each[i].item() for each in (step.returns, step.lengths, step.truncated))
+                row: Any = [each[i].item() for each in (step.returns, step.lengths, step.truncated)]
                 ended.append(EndedEpisode(self.steps, *row))
         return Steps(*map(torch.stack, zip(*steps, strict=True))), ended
 
@@ -228,10 +233,3 @@ def perceptron(
         nn.init.zeros_(layer.bias)
         layers += [layer] if is_last else [layer, nn.Tanh()]
     return nn.Sequential(*layers)
-
-
-def make_policy(
-    features: int, actions: int, hidden: Sequence[int], generator: torch.Generator
-) -> nn.Sequential:
-    """A network from observations to actions, which are clipped where they are used."""
-    return perceptron(features, hidden, actions, _LAST_LAYER, generator)

@@ -50,7 +50,8 @@ class _Callback(BaseCallback):
         self._buffer.durations[self._buffer.pos] = walkers.step_durations()
         for i in np.flatnonzero(self.locals["dones"]):
             info = self.locals["infos"][i]
-            episode, survived = info["episode"], info["TimeLimit.truncated"]
+            episode = info["episode"]
+            survived = info["TimeLimit.truncated"] or bool(info.get("is_success", False))
             self._recorder.add(
                 EndedEpisode(self.num_timesteps, episode["r"], episode["l"], survived)
             )
@@ -174,6 +175,8 @@ class StableBaselinesLearner:
         for name, moments in self._moments().items():
             moments.mean, moments.var = state[name]["mean"], state[name]["var"]
             moments.count = float(state[name]["count"])
+            if moments.count < 0.0 or np.any(np.less(moments.var, 0.0)):
+                raise ValueError(f"{name} must have a variance of 0 or more")
         self._normaliser.returns = state["normaliser"]["returns"]
         self._walkers.restore(state["walkers"])
         model.num_timesteps, model._n_updates = int(state["steps"]), int(state["updates"])
@@ -184,7 +187,7 @@ class StableBaselinesLearner:
         np.random.set_state({"bit_generator": "MT19937", **state["numpy"]})  # noqa: NPY002
 
     def _moments(self) -> dict[str, Any]:
-        found = {"returns": self._normaliser.ret_rms}
+        found: dict[str, Any] = {"returns": self._normaliser.ret_rms}
         if self._normaliser.norm_obs:
             found["observations"] = self._normaliser.obs_rms
         return found

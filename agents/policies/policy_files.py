@@ -9,7 +9,7 @@ from typing import Any
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.extras import needs_extra
-from lean_yaw_env.files import read_json, write_json, written_whole
+from lean_yaw_env.files import read_json, read_regular, write_json, written_whole
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.registration import ALL_ENV_IDS, NAMESPACE, TASK_IDS
 
@@ -24,6 +24,7 @@ SHIPPED = Path(__file__).parents[1] / "trained"
 """Agents that come with the package, as ``<Task>-v<version>/<algorithm>/seed<k>/``."""
 DEFAULT_ALGORITHM = "ppo"
 """Whose agent is meant where none is named."""
+_MOST_WEIGHTS = 2**28  # bytes: a thousand times the largest that is trained here
 
 _CARD_KEYS: dict[str, type] = {
     "algorithm": str,
@@ -173,12 +174,12 @@ def options_to_plain(options: EnvOptions) -> dict[str, Any]:
 
 def options_from_plain(plain: dict[str, Any]) -> EnvOptions:
     """The options that ``options_to_plain`` wrote, or ``ValueError``."""
-    values = dict(plain)
+    values = dict(_known("options", plain, EnvOptions))
     if "parameters" in values:
         values["parameters"] = WalkerParameters(
             **_known("parameters", values["parameters"], WalkerParameters)
         )
-    return EnvOptions(**_known("options", values, EnvOptions))
+    return EnvOptions(**values)
 
 
 def _changed(record: Any) -> dict[str, Any]:
@@ -225,7 +226,7 @@ def _read_card(path: Path) -> tuple[PolicyCard, str]:
 
 def _read_weights(path: Path, digest: str) -> dict[str, Any]:
     try:
-        data = path.read_bytes()
+        data = read_regular(path, _MOST_WEIGHTS)
     except OSError as error:
         raise ValueError(f"{path.name} cannot be read: {error}") from error
     if hashlib.sha256(data).hexdigest() != digest:
@@ -235,6 +236,8 @@ def _read_weights(path: Path, digest: str) -> dict[str, Any]:
         return library.numpy.load(data)
     except library.SafetensorError as error:
         raise ValueError(f"{path.name} is damaged: {error}") from error
+    except (KeyError, AttributeError, TypeError) as error:  # numpy has no such numbers
+        raise ValueError(f"{path.name} must hold float32 numbers, got {error}") from error
 
 
 def _safetensors() -> Any:

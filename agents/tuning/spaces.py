@@ -117,6 +117,7 @@ _SPEED_COST: dict[str, Range] = {"weights.speed": (0.01, 10.0, True)}
 _LIMIT: dict[str, Range] = {"largest_error": (0.1, 3.0, True)}
 _ANGLE: dict[str, Range] = {"inter_leg_angle": (0.15, 0.45, False)}
 _TURN = _LIMIT | {"turning_angle": (0.2, 0.45, False), "turning_error": (0.05, 1.0, True)}
+_GUIDED = {f"loop.{path}": entry for path, entry in (_LOOP | _ANGLE | _TURN).items()}
 _PUMPING: dict[str, Range] = {"pumping.downhill": (0.0, 0.045, False)}
 _UPHILL: dict[str, Range] = {"pumping.uphill": (0.01, 0.05, False)}
 _STEERING: dict[str, Range] = {
@@ -127,10 +128,6 @@ _STEERING: dict[str, Range] = {
     "inter_leg_angle": (-0.15, 0.15, False),
 }
 _SPEED: dict[str, Range] = {"speed": (-2.0, 0.0, False), "speed_error": (-1.0, 1.0, False)}
-
-
-def _within_loop(ranges: dict[str, Range]) -> dict[str, Range]:
-    return {f"loop.{path}": entry for path, entry in ranges.items()}
 
 
 RANGES: dict[tuple[str, str], dict[str, Range]] = {
@@ -144,10 +141,8 @@ RANGES: dict[tuple[str, str], dict[str, Range]] = {
     ("lqr", "Level"): _LOOP | _ANGLE | _TURN | _PUMPING,
     ("lqr", "Walk"): _LOOP | _ANGLE,
     ("lqr", "Push"): _LOOP | _ANGLE | _PUMPING,
-    ("lqr", "Slalom"): _within_loop(_LOOP | _ANGLE | _TURN)
-    | {"ahead": (0.0, 6.0, False), "approach": (1.0, 30.0, True)},
-    ("lqr", "Waypoint"): _within_loop(_LOOP | _ANGLE | _TURN)
-    | {"radius": (1.0, 8.0, True), "persistence": (0.0, 2.0, False)},
+    ("lqr", "Slalom"): _GUIDED | {"ahead": (0.0, 6.0, False), "approach": (1.0, 30.0, True)},
+    ("lqr", "Waypoint"): _GUIDED | {"radius": (1.0, 8.0, True), "persistence": (0.0, 2.0, False)},
 }
 """Of the numbers that are tuned, by agent and task and by their paths in the settings."""
 

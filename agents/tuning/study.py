@@ -40,6 +40,8 @@ _WAITING_REPORTS = 5  # of each
 _AS_THEY_ARE = "as_they_are"
 """Marks the trial of the settings that come with the package."""
 _PROCESS = "process"
+_AGAIN = "again"
+"""Marks the trial that tries an unfinished one again, by the number of that one."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,7 @@ def tune(
     Parameters
     ----------
     storage : file of the study, made if it does not exist; None to keep it in memory
-    out : JSON file for the best settings so far, written after each trial; see ``best_record``
+    out : JSON file for the best settings so far, written after each trial, as ``shipping.ship`` takes it
     progress : show a bar for each training
     shown : takes a line for each trial
 
@@ -125,7 +127,8 @@ def tune(
         best = best_trial(study)
         if best is not None and out is not None:
             out.parent.mkdir(parents=True, exist_ok=True)
-            write_json(out, best_record(tuning, best))
+            found = {"trial": best.number, "score": best.value, "values": best.user_attrs["values"]}
+            write_json(out, asdict(tuning) | found)
         shown(f"{done()} of {trials}: {result_words(trial)}; {result_words(best)} is the best")
 
     if done() < trials:
@@ -138,21 +141,8 @@ def tune(
 def best_trial(study: optuna.Study) -> FrozenTrial | None:
     """The trial with the highest score, or None if none is complete."""
     complete = study.get_trials(states=(TrialState.COMPLETE,))
-    return max(
-        (trial for trial in complete if "values" in trial.user_attrs),
-        key=lambda trial: -math.inf if trial.value is None else trial.value,
-        default=None,
-    )
-
-
-def best_record(tuning: Tuning, best: FrozenTrial) -> dict[str, Any]:
-    """The best settings and where they come from, as plain values: what ``shipping.ship_settings`` takes."""
-    return {
-        **asdict(tuning),
-        "trial": best.number,
-        "score": best.value,
-        "values": best.user_attrs["values"],
-    }
+    sound = [trial for trial in complete if "values" in trial.user_attrs]
+    return max(sound, key=lambda trial: trial.values[0], default=None)
 
 
 def result_words(trial: FrozenTrial | None) -> str:
@@ -212,17 +202,25 @@ def _require_study_file(storage: Path, name: str) -> None:
 
 
 def _take_up(study: optuna.Study, space: Space) -> None:
-    """Give up trials whose process was killed, and see that the settings as they are get tried."""
+    """Enqueue the settings as they are in a new study, and again the trials that an interruption or a killed process left unfinished."""
     for trial in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
         host, process = trial.user_attrs.get(_PROCESS, (platform.node(), 0))
         if host == platform.node() and not (process and is_running(process)):
             study.tell(trial.number, state=TrialState.FAIL)
-    kept = study.get_trials(deepcopy=False, states=(*_FINISHED, TrialState.WAITING))
-    if not any(_AS_THEY_ARE in trial.user_attrs for trial in kept):
-        with warnings.catch_warnings():
-            # the settings as they are may lie outside what is searched; Optuna says so and takes these values
-            warnings.simplefilter("ignore", UserWarning)
-            study.enqueue_trial(dict(space.start), user_attrs={_AS_THEY_ARE: True})
+    trials = study.get_trials(deepcopy=False)
+    enqueued = [] if trials else [(dict(space.start), {_AS_THEY_ARE: True})]
+    again = {trial.user_attrs.get(_AGAIN) for trial in trials}
+    for trial in trials:
+        if trial.state is TrialState.FAIL and trial.number not in again:
+            is_first = _AS_THEY_ARE in trial.user_attrs
+            attributes: dict[str, Any] = {_AGAIN: trial.number}
+            attributes |= {_AS_THEY_ARE: True} if is_first else {}
+            enqueued.append((dict(space.start) if is_first else trial.params, attributes))
+    with warnings.catch_warnings():
+        # the settings as they are may lie outside what is searched; Optuna says so and takes these values
+        warnings.simplefilter("ignore", UserWarning)
+        for values, attributes in enqueued:
+            study.enqueue_trial(values, user_attrs=attributes)
 
 
 def _score(trial: optuna.Trial, tuning: Tuning, space: Space, progress: bool) -> float:

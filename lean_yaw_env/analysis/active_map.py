@@ -40,7 +40,7 @@ from lean_yaw_env.parameters import (
     require_state,
 )
 from lean_yaw_env.validation import require_choice, require_count, require_finite, require_instance
-from lean_yaw_env.walker import StepResult, Walker, require_completed
+from lean_yaw_env.walker import Fall, StepResult, Walker, require_completed
 
 if TYPE_CHECKING:
     from typing_extensions import Self, Unpack
@@ -143,13 +143,14 @@ class ActiveMap(SectionMap):
     def step_many(
         self, states: Vector, carried: Vector, foot: int
     ) -> tuple[Vector, Vector, Vector]:
-        commands = np.empty((len(states), 3))
-        commands[:, 0], commands[:, 1], commands[:, 2] = (
-            self.inter_leg_angle,
-            self.mass_offset[foot],
-            carried,
-        )
-        rows = step_rows(self._bodies, commands, states, foot)
+        command = np.array([[self.inter_leg_angle, self.mass_offset[foot]]])
+        return self.step_commanded(states, carried, command, foot)
+
+    def step_commanded(
+        self, states: Vector, carried: Vector, commands: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
+        whole = np.column_stack([np.broadcast_to(commands, (len(states), 2)), carried])
+        rows = step_rows(self._bodies, whole, states, foot)
         return rows[:, :STATE_SIZE], rows[:, _OFFSET], rows[:, _STATUS]
 
     def search(self) -> Iterator[Vector]:
@@ -298,8 +299,22 @@ def search_active(section_map: ActiveMap, *, exact: bool) -> Vector:
     offsets = f"{left:g}" if left == right else f"({left:g}, {right:g})"
     raise NoGaitError(
         f"no gait found for {section_map.walker.parameters} with inter-leg angle "
-        f"{section_map.inter_leg_angle:g} and mass offset {offsets}; tried: {'; '.join(tried)}"
+        f"{section_map.inter_leg_angle:g} and mass offset {offsets}; tried: {'; '.join(tried)}. "
+        f"{_advice(section_map, tried)}"
     )
+
+
+def _advice(section_map: ActiveMap, tried: list[str]) -> str:
+    """What to change where no gait was found."""
+    if any(Fall.LIFT_OFF.value in each for each in tried):
+        return "Try a gentler slope, smaller feet or a smaller inter-leg angle: so fast, the foot lifts off"
+    slope, offset = section_map.value("slope"), section_map.value("mass_offset")
+    if slope <= 0.0 and section_map.value("alternating_offset") == 0.0:
+        return "Try a positive slope, or pump: an alternating offset near 0.03 drives the walker"
+    most = math.tan(slope)
+    if abs(offset) >= most > 0.0 and not section_map.walker.parameters.slope_turns:
+        return f"Try a mass offset well within ±{most:.3g}, the most that this slope can balance, or a steeper slope"
+    return "Try a steeper slope, a smaller inter-leg angle or mass offset, narrower hips, or an ankle tilt near 0.5"
 
 
 def _planar_guess(section_map: ActiveMap) -> Vector:

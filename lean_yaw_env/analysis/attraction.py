@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -93,7 +93,10 @@ def basin(
         section_map.require_state(require_array("centre", centre, (len(section_map.names),)))
     cycle = find_limit_cycle(section_map) if centre is None else None
     middle = cycle.state if cycle is not None else section_map.require_state(np.asarray(centre))
-    axes, states = slice_of(section_map, x, y, middle)
+    x, y = (require_pair(*axis, "coordinate, values") for axis in (("x", x), ("y", y)))
+    if x[0] == y[0]:
+        raise ValueError(f"x and y must be different coordinates, got {x[0]!r} twice")
+    axes, states = section_grid(section_map, dict((x, y)), middle)
     result: dict[str, Vector] = {
         "steps": np.zeros(len(states)),
         "ending": np.full(len(states), -1.0),
@@ -118,25 +121,25 @@ def basin(
     return growing.dataset()
 
 
-def slice_of(
-    section_map: SectionMap,
-    x: tuple[str, Sequence[float] | Vector],
-    y: tuple[str, Sequence[float] | Vector],
-    centre: Vector,
+def section_grid(
+    section_map: SectionMap, axes: Mapping[str, Sequence[float] | Vector], centre: Vector
 ) -> tuple[dict[str, Vector], Vector]:
-    """The axes of a plane of the section through a state (k,), and the states (n, k) at its points, or ``ValueError``."""
-    x, y = (require_pair(*axis, "coordinate, values") for axis in (("x", x), ("y", y)))
-    if x[0] == y[0]:
-        raise ValueError(f"x and y must be different coordinates, got {x[0]!r} twice")
-    axes: dict[str, Vector] = {}
-    for name, values in (x, y):
+    """The axes of a slice or box of the section, and the states (n, k) at its points, the other coordinates those of ``centre`` (k,).
+
+    Raises
+    ------
+    ValueError
+        If a name is no coordinate, or its values do not grow or leave its range.
+    """
+    checked: dict[str, Vector] = {}
+    for name, values in axes.items():
         _index(section_map, name)
         bound = QUARTER_TURN if name in _BOUNDED else 1e6
-        axes[name] = require_axis(f"values of {name}", values, -bound, bound)
-    columns = [grid.ravel() for grid in np.meshgrid(*axes.values(), indexing="ij")]
+        checked[name] = require_axis(f"values of {name}", values, -bound, bound)
+    columns = [grid.ravel() for grid in np.meshgrid(*checked.values(), indexing="ij")]
     states = np.tile(centre, (columns[0].size, 1))
-    states[:, [section_map.names.index(name) for name in axes]] = np.column_stack(columns)
-    return axes, states
+    states[:, [section_map.names.index(name) for name in checked]] = np.column_stack(columns)
+    return checked, states
 
 
 @dataclass(frozen=True)

@@ -144,7 +144,8 @@ class PassiveMap(SectionMap):
             raise NoGaitError(
                 f"no gait found for the passive walker of {self.walker.parameters}; tried: "
                 f"{_PITCHES.size * _RATES.size} planar starts, following each gait from no hip "
-                f"width; reasons: {'; '.join(sorted(reasons))}"
+                f"width; reasons: {'; '.join(sorted(reasons))}. Try a positive slope that is gentle (below 0.05), "
+                "hips narrower than 0.1, or an ankle tilt near 0.15"
             )
 
     def main_gait(self) -> Vector:

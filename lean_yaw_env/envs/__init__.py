@@ -3,6 +3,7 @@
 from lean_yaw_env.envs.goal_env import WaypointGoalEnv, WaypointGoalVectorEnv
 from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.envs.real_time import RealTime
 from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.envs.state import Field
 from lean_yaw_env.envs.tasks import Command, Feature, Metric, Task, register_task, task_named
@@ -18,6 +19,7 @@ __all__ = [
     "Feature",
     "Field",
     "Metric",
+    "RealTime",
     "Simulation",
     "Task",
     "WalkerEnv",

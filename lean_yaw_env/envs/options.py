@@ -132,7 +132,7 @@ class EnvOptions:
         known = [field.name for field in fields(cls)]
         for name in require_mapping("arguments", arguments):
             if name not in known:
-                raise TypeError(f"option {name!r} is unknown{suggestion(name, known)}")
+                raise TypeError(f"unexpected keyword argument {name!r}{suggestion(name, known)}")
         return cls(**arguments)
 
     def for_task(self, task: Task) -> TaskOptions:

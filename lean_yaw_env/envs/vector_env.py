@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy as copied
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import EzPickle, seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -14,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.envs.info import InfoTables
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, action_space
-from lean_yaw_env.envs.pictures import MOST_PICTURES, RENDER_FPS, Gallery
+from lean_yaw_env.envs.pictures import MOST_PICTURES, STEPS_PER_SECOND, Gallery
 from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.envs.snapshots import PickledWithState, State, restore, state_of
 from lean_yaw_env.envs.tasks import Task, task_named
@@ -65,6 +67,7 @@ class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float
     """
 
     metadata: dict[str, Any] = {}  # noqa: RUF012 (each environment sets its own)
+    _spec: EnvSpec | None = None
 
     def __init__(
         self,
@@ -97,7 +100,7 @@ class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float
         self.metadata = {
             "autoreset_mode": self.autoreset_mode,
             "render_modes": list(_RENDER_MODES),
-            "render_fps": RENDER_FPS,
+            "render_fps": STEPS_PER_SECOND,
         }
         self.render_mode = render_mode
         self.copy = require_flag("copy", copy)
@@ -217,6 +220,19 @@ class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float
         self._ended[:] = ended
         if self._gallery is not None:
             self._gallery.restart(np.ones(self.num_envs, dtype=np.bool_))
+
+    @property
+    def spec(self) -> EnvSpec | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """What the environment is made from, its ``max_episode_steps`` included; ``gymnasium.make_vec`` sets it."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = copied(spec)
+        if self._spec is not None:
+            # make_vec leaves it among the arguments
+            limit = self._spec.kwargs.get("max_episode_steps", self._spec.max_episode_steps)
+            self._spec.max_episode_steps = limit
 
     def _require_actions(self, actions: ArrayLike) -> NDArray[np.float32]:
         chosen = self.simulation.require_actions("actions", actions, (self.num_envs, ACTION_SIZE))

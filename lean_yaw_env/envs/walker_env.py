@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -12,10 +12,11 @@ from gymnasium.utils import EzPickle
 from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, action_space
-from lean_yaw_env.envs.pictures import RENDER_FPS, Gallery
+from lean_yaw_env.envs.pictures import FRAMES_PER_SECOND, STEPS_PER_SECOND, Gallery
 from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.envs.snapshots import PickledWithState, State, restore, state_of
 from lean_yaw_env.envs.tasks import Task, task_named
+from lean_yaw_env.rendering.filming import Frame
 from lean_yaw_env.rendering.pygame_renderer import Renderer
 from lean_yaw_env.validation import require_choice, require_seed
 
@@ -60,8 +61,9 @@ class WalkerEnv(PickledWithState, gym.Env[NDArray[np.float32], NDArray[np.float3
     ----------
     task : str or Task
         A task's name, its environment id, or a task of your own.
-    render_mode : None, "rgb_array" or "human"
-        Pictures need pygame, windows a display.
+    render_mode : None, "rgb_array", "rgb_array_list" or "human"
+        ``render`` returns the picture after the last heel strike, or a list of pictures within the steps since it was last called; "human" shows
+        these in a window, in real time. Pictures need pygame, windows a display. ``RealTime`` makes films with Gymnasium's ``RecordVideo``.
     **options
         See ``EnvOptions``.
 
@@ -75,9 +77,9 @@ class WalkerEnv(PickledWithState, gym.Env[NDArray[np.float32], NDArray[np.float3
         If the walker has no gait to start from.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # pyright: ignore[reportIncompatibleVariableOverride]
-        "render_modes": ["rgb_array", "human"],
-        "render_fps": RENDER_FPS,
+    metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium has it so
+        "render_modes": ["rgb_array", "rgb_array_list", "human"],
+        "render_fps": STEPS_PER_SECOND,
     }
 
     def __init__(
@@ -87,6 +89,8 @@ class WalkerEnv(PickledWithState, gym.Env[NDArray[np.float32], NDArray[np.float3
         if render_mode is not None:
             require_choice("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
+        if render_mode in ("rgb_array_list", "human"):
+            self.metadata = {**self.metadata, "render_fps": FRAMES_PER_SECOND}
         self.options = EnvOptions.of(options)
         self.task = task_named(task)
         self.simulation = Simulation(self.task, self.options, 1)
@@ -96,6 +100,7 @@ class WalkerEnv(PickledWithState, gym.Env[NDArray[np.float32], NDArray[np.float3
         self._views = self.simulation.info.views(self._infos[0])
         self.is_under_way = self._has_begun = False
         self._gallery = None if render_mode is None else Gallery(self.simulation, Renderer())
+        self._frames: list[Frame] = []
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -164,14 +169,27 @@ class WalkerEnv(PickledWithState, gym.Env[NDArray[np.float32], NDArray[np.float3
         (self.np_random,) = restore(self.simulation, state)
         self._begin()
 
-    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The picture just after the last heel strike, for "rgb_array"; shape (height, width, 3)."""
+    def render(self) -> Frame | list[Frame] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """A picture, (height, width, 3), or a list of them, as the render mode says."""
         if self._gallery is None:
             gym.logger.warn("render() draws nothing: make the environment with a render_mode")
             return None
-        if not self._has_begun:
+        if self.render_mode == "rgb_array":
+            return self.picture()
+        frames, self._frames = self._frames, []
+        return frames if self.render_mode == "rgb_array_list" else None
+
+    def picture(self, share: float = 1.0) -> Frame:
+        """The picture after a share of the last step, (height, width, 3): at 1, just after the heel strike or where the walker fell.
+
+        Raises
+        ------
+        ResetNeeded
+            Before the first episode, and without a ``render_mode``.
+        """
+        if self._gallery is None or not self._has_begun:
             raise ResetNeeded("call reset() before render()")
-        return None if self.render_mode == "human" else self._gallery.frames()[0]
+        return self._gallery.frame(share=share)
 
     def get_keys_to_action(self) -> dict[str, NDArray[np.float32]]:
         """Actions of keys held together, for ``gymnasium.utils.play``: "a" and "d" steer left and right, "w" and "s" walk faster and slower.
@@ -197,10 +215,16 @@ class WalkerEnv(PickledWithState, gym.Env[NDArray[np.float32], NDArray[np.float3
 
     def _begin(self) -> None:
         self.is_under_way = self._has_begun = True
+        self._frames = []
         if self._gallery is not None:
             self._gallery.restart(_ONE)
             self._show(self._gallery)
 
     def _show(self, gallery: Gallery) -> None:
-        if self.render_mode == "human":
-            gallery.renderer.show(gallery.scene(0), RENDER_FPS)
+        """Draw what is to be seen of the last step."""
+        walk = gallery.walk()
+        if self.render_mode == "rgb_array_list":
+            self._frames += [gallery.frame(share=share) for share in walk.shares()]
+        elif self.render_mode == "human":
+            for share in walk.shares():
+                gallery.renderer.show(walk.scene(share), FRAMES_PER_SECOND)

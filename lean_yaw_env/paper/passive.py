@@ -80,13 +80,13 @@ def figure_7() -> Result:
 
 def _gait_checks() -> list[Check]:
     points, arcs = gait_of(point_foot_walker()), gait_of(arc_foot_walker())
-    slow, fast = sorted((points.speed, arcs.speed))
+    apart = abs(arcs.speed / points.speed - 1.0)
     return [
         *compare_all("stance leg angle, ", (points.state[1], arcs.state[1])),
         assess(
             "velocity of A and B",
-            round(slow, 2) == round(fast, 2),
-            f"A {points.speed:.4f}, B {arcs.speed:.4f}, {abs(arcs.speed / points.speed - 1.0):.1%} apart",
+            apart <= 0.03,
+            f"A {points.speed:.4f}, B {arcs.speed:.4f}, {apart:.1%} apart",
         ),
         compare("efficiency", POINT_FOOT_SLOPE / slope_of_pitch(float(points.state[1]))),
     ]
@@ -124,7 +124,7 @@ def passive_claims() -> Result:
     """Slope limits, basins, modes, steeper slopes."""
     flat = modes(gait_of(flat_passive_walker()))
     fore_aft = [mode.name for mode in flat].count("fore-aft")
-    pure = all(min(mode.lateral_share, 1.0 - mode.lateral_share) < 1e-9 for mode in flat)
+    mixed = max(1.0 - mode.lateral_share for mode in flat if mode.name != "fore-aft")
     steep = gait_of(flat_passive_walker(POINT_FOOT_SLOPE))
     pitch = float(steep.state[1])
     checks = [
@@ -140,9 +140,9 @@ def passive_claims() -> Result:
         assess(
             "modes, C",
             fore_aft == 3,
-            f"{fore_aft} fore-aft, {len(flat) - fore_aft} three-dimensional"
-            + (", each purely so" if pure else ""),
+            f"{fore_aft} fore-aft, {len(flat) - fore_aft} three-dimensional",
         ),
+        assess("three-dimensional modes, C", mixed > 1e-9, f"{mixed:.0e}" if mixed > 1e-9 else "0"),
         compare(
             "stance leg angle at γ = 0.004",
             pitch,

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lean_yaw_env.extras import needs_extra
-from lean_yaw_env.rendering.body_views import draw_rear_view, draw_side_view
 from lean_yaw_env.rendering.camera import Panel
 from lean_yaw_env.rendering.canvas import Canvas
 from lean_yaw_env.rendering.geometry import walker_shape
 from lean_yaw_env.rendering.palette import BACKGROUND
+from lean_yaw_env.rendering.perspective import draw_perspective_view
 from lean_yaw_env.rendering.scene import Scene
 from lean_yaw_env.rendering.top_view import draw_top_view
 from lean_yaw_env.validation import require_count, require_instance, require_number
@@ -28,7 +28,7 @@ _TOP_SHARE = 0.585  # of the width, for the view from above
 
 
 class Renderer:
-    """Draws scenes: from above on the left, from the side and from behind on the right.
+    """Draws scenes: from above on the left, and in perspective on the right.
 
     Parameters
     ----------
@@ -108,24 +108,13 @@ class Renderer:
         return self._window
 
     def _draw(self, scene: Scene) -> None:
-        top, side, rear = _panels(self.size)
+        width, height = self.size
+        split = round(_TOP_SHARE * width)
         shape = walker_shape(scene.parameters, scene.pose)
         self._canvas.clear()
-        draw_top_view(self._canvas, top, scene, shape)
-        draw_side_view(self._canvas, side, scene, shape)
-        draw_rear_view(self._canvas, rear, scene, shape)
-
-
-def _panels(size: tuple[int, int]) -> tuple[Panel, Panel, Panel]:
-    width, height = size
-    split = round(_TOP_SHARE * width)
-    middle = round(0.5 * height)
-    rest = width - split - _GAP
-    return (
-        Panel(0.0, 0.0, split, height),
-        Panel(split + _GAP, 0.0, rest, middle - 0.5 * _GAP),
-        Panel(split + _GAP, middle + 0.5 * _GAP, rest, height - middle - 0.5 * _GAP),
-    )
+        draw_top_view(self._canvas, Panel(0.0, 0.0, split, height), scene, shape)
+        beside = Panel(split + _GAP, 0.0, width - split - _GAP, height)
+        draw_perspective_view(self._canvas, beside, scene, shape)
 
 
 def _require_size(size: tuple[int, int]) -> tuple[int, int]:
