@@ -161,9 +161,46 @@ def test_runs_side_by_side_finish_and_one_that_fails_is_named(tmp_path):
     with pytest.raises(RunError, match="seed1"):
         run_side_by_side(runs[1:], 2, progress=False)
     (runs[1] / "checkpoint.safetensors").unlink()
+    (runs[0] / "run.json").rename(runs[0] / "kept.json")
+    with pytest.raises(RunError, match="seed0"):
+        run_side_by_side(runs, 2, progress=False)
+    assert is_finished(runs[1])  # the other run went on
+    (runs[0] / "kept.json").rename(runs[0] / "run.json")
     run_side_by_side(runs, 2, progress=False)
     assert all(is_finished(place) for place in runs)
     assert all(read_log(place).seconds > 0.0 for place in runs)
+
+
+def test_a_broken_run_of_a_series_does_not_stop_the_others(tmp_path, monkeypatch):
+    folder = new_series("Walk", [0, 1], tmp_path, TINY)
+    first, second = runs_of(folder).values()
+    (first / "checkpoint.safetensors").write_bytes(b"nothing of the kind")
+    trained = []
+    original = series.run
+
+    def noted(place: Path, **keywords):
+        result = original(place, **keywords)
+        trained.append(place)
+        return result
+
+    monkeypatch.setattr(series, "run", noted)
+    with pytest.raises(RunError, match=r"seed0.*no checkpoint can be read"):
+        run_series(folder, progress=False)
+    assert trained == [second]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    ["[]", {"env_id": 3}, {"seeds": []}, {"seeds": [1, 1]}, {"seeds": ["0"]}, {"seeds": 2}, {"seeds": [0.5]}, {"seeds": [-1]}],
+)  # fmt: skip
+def test_a_damaged_series_is_refused(tmp_path, changes):
+    folder = new_series("Walk", [0, 1], tmp_path, TINY)
+    file = folder / "series.json"
+    file.write_text(
+        changes if isinstance(changes, str) else json.dumps(json.loads(file.read_text()) | changes)
+    )
+    with pytest.raises(ValueError, match="is not a series'"):
+        resumed("Walk", tmp_path, folder)
 
 
 @pytest.mark.parametrize(

@@ -264,6 +264,8 @@ def test_an_interruption_loses_the_trial_under_way_only_and_not_the_first(
     assert len(complete) == 4
     values = [tuple(sorted(trial.params.items())) for trial in complete]
     assert len(set(values)) == 4  # going on draws nothing a second time
+    (unfinished,) = found.get_trials(states=(TrialState.FAIL,))
+    assert tuple(sorted(unfinished.params.items())) in values  # it is tried again
     kept = [trial.user_attrs["values"] for trial in complete]
     assert values_of(TINY) in kept  # the settings as they are
 

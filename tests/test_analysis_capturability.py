@@ -209,7 +209,10 @@ def test_a_solvers_failure_is_raised_and_no_fall(monkeypatch) -> None:
         ({"most_steps": 5}, "most_steps must be from 0 to 4"),
         ({"settle_steps": 0}, "settle_steps must be"),
         ({"states": STATES[:, :4]}, "states must have shape"),
-        ({"known": Capture(np.zeros(2, dtype=int), np.zeros((2, 2, 2)))}, "known must be of the same states"),
+        (
+            {"known": Capture(np.zeros(2, dtype=int), np.zeros((2, 2, 2)))},
+            "known must be of the same states",
+        ),
     ],
 )
 def test_bad_arguments_are_refused_by_name(change: Any, message: str) -> None:

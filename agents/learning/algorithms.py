@@ -21,7 +21,7 @@ from .apg import GradientLearner, GradientSettings
 from .her import HERLearner, HERSettings
 from .learner import Learner, LearnerSettings, settings_to_plain
 from .ppo import PPOLearner, PPOSettings
-from .recorder import Recorder, Report, TrainingLog
+from .recorder import CheckpointError, Recorder, Report, TrainingLog
 from .sac import SACLearner, SACSettings
 
 
@@ -117,6 +117,10 @@ def train(
             report=report,
         )
         recorder.resume(learner.restore)
+        if not 0 <= learner.steps < settings.steps + settings.update_steps:
+            raise CheckpointError(
+                f"the checkpoint is of {learner.steps:,} steps, and the training ends at {settings.steps:,}"
+            )
         with recorder.running(learner.steps):
             learner.learn(recorder)
             recorder.between_updates(learner.steps, last=True)

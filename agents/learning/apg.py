@@ -68,6 +68,10 @@ class GradientSettings(LearnerSettings):
     exploration: float = 0.05
     largest_gradient: float = 1.0
 
+    @property
+    def update_steps(self) -> int:
+        return self.walkers * self.window
+
     def __post_init__(self) -> None:
         super().__post_init__()
         self.require_counts("window", "critic_epochs", "critic_batches")
@@ -75,10 +79,9 @@ class GradientSettings(LearnerSettings):
         self.require_shares("critic_memory", "trace")
         self.require_positive("critic_learning_rate", "largest_gradient")
         require_number("exploration", self.exploration, 0.0, 10.0, "(]")
-        samples = self.walkers * self.window
-        if samples % self.critic_batches:
+        if self.update_steps % self.critic_batches:
             raise ValueError(
-                f"critic_batches must divide the {samples} samples of a window, got {self.critic_batches}"
+                f"critic_batches must divide the {self.update_steps} samples of a window, got {self.critic_batches}"
             )
 
 

@@ -95,6 +95,10 @@ class TimeDiscountedReplay(ReplayBuffer):
         """Bring the buffer to what ``captured`` returned, or raise ``KeyError`` or ``ValueError`` if it is another buffer's."""
         arrays = flattened(state)
         self.pos, filled = (int(value) for value in arrays["position"])
+        if not 0 <= self.pos < self.buffer_size or filled not in (self.pos, self.buffer_size):
+            raise ValueError(
+                f"position must be in the buffer of {self.buffer_size}, got {self.pos}"
+            )
         self.full = filled == self.buffer_size
         for name, column in self._columns().items():
             column[:filled] = arrays[name]

@@ -53,6 +53,11 @@ class LearnerSettings:
         """The discount over a step of the gait's duration, where only one number is possible."""
         return math.exp(-GAIT_STEP / self.time_constant)
 
+    @property
+    def update_steps(self) -> int:
+        """Steps of all walkers between two updates at most: a training may end so many after ``steps``."""
+        return self.steps
+
     def learning_rate_share(self, left: float) -> float:
         """Share of the first learning rate when the share ``left`` of the training is left."""
         return self.final_learning_rate + (1.0 - self.final_learning_rate) * left
@@ -64,10 +69,10 @@ class LearnerSettings:
         self.require_shares("final_learning_rate")
         if self.push_level is not None:
             require_number("push_level", self.push_level, 0.0, 10.0)
-        if not self.hidden or any(units < 1 for units in self.hidden):
-            raise ValueError(
-                f"hidden must name one layer or more of 1 unit or more, got {self.hidden}"
-            )
+        if not isinstance(self.hidden, tuple) or not self.hidden:
+            raise ValueError(f"hidden must name one layer or more, got {self.hidden!r}")
+        for units in self.hidden:
+            require_count("units of a hidden layer", units, 1, 2**16)
 
     def require_counts(self, *names: str, low: int = 1) -> None:
         """``ValueError`` unless these settings are whole numbers from ``low`` on."""

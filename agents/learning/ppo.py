@@ -49,6 +49,10 @@ class PPOSettings(LearnerSettings):
     largest_gradient: float = 0.5
     initial_log_std: float = -0.5
 
+    @property
+    def update_steps(self) -> int:
+        return self.walkers * self.steps_per_update
+
     def __post_init__(self) -> None:
         super().__post_init__()
         self.require_counts("steps_per_update", "batch_size", "epochs")
@@ -57,10 +61,9 @@ class PPOSettings(LearnerSettings):
         for name in ("entropy", "value_weight"):
             require_number(name, getattr(self, name), 0.0, math.inf, "[)")
         require_number("initial_log_std", self.initial_log_std, -20.0, 2.0)
-        samples = self.walkers * self.steps_per_update
-        if samples % self.batch_size:
+        if self.update_steps % self.batch_size:
             raise ValueError(
-                f"batch_size must divide the {samples} samples of an update, got {self.batch_size}"
+                f"batch_size must divide the {self.update_steps} samples of an update, got {self.batch_size}"
             )
 
 

@@ -28,6 +28,7 @@ Report = Callable[[int, float], object]
 An exception that it raises ends the training.
 """
 
+_TYPES = (np.int64, np.float64, np.int64, np.bool_)
 _CSV_HEADER = "steps,return,length,survived"
 _RECENT = 128  # episodes in the mean return that is shown and reported
 
@@ -67,8 +68,18 @@ class TrainingLog:
         """A log of rows (steps, return, length, survived)."""
         rows = list(episodes)
         columns = zip(*rows, strict=True) if rows else ((),) * 4
-        types = (np.int64, np.float64, np.int64, np.bool_)
-        return cls(*map(np.array, columns, types), seconds)  # type: ignore[arg-type]
+        return cls(*map(np.array, columns, _TYPES), seconds)  # type: ignore[arg-type]
+
+    def require_sound(self) -> None:
+        """``ValueError`` unless these are the episodes of a training."""
+        n = len(self.steps)
+        columns = (self.steps, self.returns, self.lengths, self.survived)
+        types = [(column.dtype, column.shape) for column in columns]
+        if types != [(np.dtype(kind), (n,)) for kind in _TYPES] or np.shape(self.seconds) != ():
+            raise ValueError(f"it has columns of {types}")
+        is_ordered = np.all(np.diff(self.steps, prepend=0) >= 0) and np.all(self.lengths > 0)
+        if not (is_ordered and np.isfinite(self.returns).all() and 0.0 <= self.seconds < np.inf):
+            raise ValueError("its numbers are none of a training")
 
     def episodes(self) -> list[EndedEpisode]:
         """The episodes one by one."""
@@ -136,6 +147,28 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     return nested({name: array.copy() for name, array in arrays.items()})
 
 
+def _require_numbers(state: State) -> None:
+    """``ValueError`` for NaN, and for infinities anywhere but among the walkers, whose limits may be infinite."""
+    for name, array in flattened(state).items():
+        is_bad = np.isnan if name.startswith("walkers/") else lambda each: ~np.isfinite(each)
+        if array.dtype.kind == "f" and is_bad(array).any():
+            raise ValueError(f"{name} must hold finite numbers")
+
+
+def _require_equal(own: Arrays, read: Arrays) -> None:
+    """``ValueError`` unless a learner has taken every array that was read as it is."""
+    for name in sorted({*own, *read}):
+        if name not in own or name not in read:
+            raise ValueError(f"it {'lacks' if name in own else 'also holds'} {name}")
+        one, other = own[name], read[name]
+        if (one.dtype, one.shape) != (other.dtype, other.shape):
+            raise ValueError(
+                f"{name} must be {one.dtype} of shape {one.shape}, got {other.dtype} of shape {other.shape}"
+            )
+        if not np.array_equal(one, other):
+            raise ValueError(f"{name} holds impossible values")
+
+
 class Recorder:
     """Keeps the log of a training of ``total`` steps, shows its progress and writes its checkpoints, whose state ``capture`` returns."""
 
@@ -172,12 +205,15 @@ class Recorder:
         state = read_checkpoint(self._checkpoint)
         try:
             log = TrainingLog(**state.pop("log"))
-            self._earlier, self._episodes = float(log.seconds), log.episodes()
-        except (KeyError, TypeError) as error:
+            log.require_sound()
+        except (KeyError, TypeError, AttributeError, ValueError) as error:
             raise CheckpointError(f"the checkpoint holds no log: {error}") from error
+        self._earlier, self._episodes = float(log.seconds), log.episodes()
         try:
+            _require_numbers(state)
             restore(state)
-        except (KeyError, RuntimeError, TypeError, ValueError) as error:
+            _require_equal(flattened(self._capture()), flattened(state))
+        except (LookupError, RuntimeError, TypeError, AttributeError, ValueError) as error:
             raise CheckpointError(
                 f"the checkpoint is not of a training with these settings: {error}"
             ) from error

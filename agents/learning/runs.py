@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -10,15 +11,23 @@ from typing import Any, NamedTuple
 from tqdm import tqdm
 
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.files import read_json, write_json
-from lean_yaw_env.validation import require_count
+from lean_yaw_env.files import locked, read_json, write_json
+from lean_yaw_env.registration import ALL_ENV_IDS
+from lean_yaw_env.validation import require_choice, require_count, require_flag, require_number
 
 from ..evaluation.episodes import Row
 from ..evaluation.pictures import save_agents_footprints
 from ..evaluation.row_tables import rows_to_plain
 from ..evaluation.scoring import evaluate
 from ..policies.policy import Policy, package_versions
-from ..policies.policy_files import CARD_FILE, options_from_plain, options_to_plain, save, task_of
+from ..policies.policy_files import (
+    CARD_FILE,
+    load,
+    options_from_plain,
+    options_to_plain,
+    save,
+    task_of,
+)
 from ..registry import AgentRequest, env_id_of, make_all
 from ..seeds import MOST_EPISODES, first_seed, training_seed
 from ..settings import with_values
@@ -65,8 +74,15 @@ class Training:
 
     def __post_init__(self) -> None:
         training_seed(self.seed)
+        require_choice("env_id", self.env_id, ALL_ENV_IDS)
+        entry = ALGORITHMS[require_choice("algorithm", self.algorithm, ALGORITHMS)]
+        require_choice(f"task of {self.algorithm}", self.task, entry.tasks)
+        if type(self.settings) is not entry.settings:
+            raise ValueError(f"settings must be {entry.settings.__name__}, got {self.settings!r}")
         require_count("episodes", self.episodes, 1, MOST_EPISODES)
         require_count("threads", self.threads, 1, 1024)
+        require_number("checkpoint_seconds", self.checkpoint_seconds, 0.0, math.inf)
+        require_flag("tensorboard", self.tensorboard)
 
     @classmethod
     def of_task(
@@ -145,17 +161,22 @@ def read_run(folder: Path) -> Training:
     try:
         values = {key: record[key] for key in Training.__dataclass_fields__}
         settings = ALGORITHMS[values["algorithm"]].settings()
+        if set(values["settings"]) != set(vars(settings)):
+            raise ValueError(f"its settings must hold {', '.join(vars(settings))}")
         values["settings"] = with_values(settings, values["settings"])
         values["options"] = options_from_plain(values["options"])
-        return Training(**values)
-    except (AttributeError, KeyError, TypeError) as error:
+        training = Training(**values)
+        seeds = (training_seed(training.seed), first_seed("validation"))
+        if (record["walkers_seed"], record["evaluation_seed"]) != seeds:
+            raise ValueError(f"its seeds of walkers and evaluation must be {seeds}")
+        return training
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{str(folder / RUN_FILE)!r} is not a run's: {error}") from error
 
 
 def read_log(folder: Path) -> TrainingLog:
     """The episodes of a finished run, or ``ValueError``."""
-    seconds = float(read_json(folder / CARD_FILE)["training"]["seconds"])
-    return TrainingLog.read(folder / LOG_FILE, seconds)
+    return TrainingLog.read(folder / LOG_FILE, float(load(folder).card.training["seconds"]))
 
 
 def run(folder: Path, *, progress: bool = True, report: Report | None = None) -> FinishedRun:
@@ -171,8 +192,14 @@ def run(folder: Path, *, progress: bool = True, report: Report | None = None) ->
     ------
     ValueError
         If the folder's files are damaged.
+    BusyError
+        If another process is at work in the folder.
     """
-    training = read_run(folder)
+    with locked(folder):
+        return _run(folder, read_run(folder), progress, report)
+
+
+def _run(folder: Path, training: Training, progress: bool, report: Report | None) -> FinishedRun:
     task, steps = training.task, training.settings.steps
     trained = train(
         training.algorithm,

@@ -48,6 +48,10 @@ class SACSettings(LearnerSettings):
     target_entropy: float = -4.0
     initial_entropy_weight: float = 0.1
 
+    @property
+    def update_steps(self) -> int:
+        return self.walkers
+
     def __post_init__(self) -> None:
         super().__post_init__()
         self.require_counts("gradient_steps", "batch_size")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import re
 import signal
@@ -20,8 +21,10 @@ from rich.table import Table
 from tqdm import tqdm
 
 from lean_yaw_env.errors import LeanYawError
-from lean_yaw_env.files import read_json, write_json, write_text
-from lean_yaw_env.validation import require_count
+from lean_yaw_env.files import locked, read_json, write_json, write_text
+from lean_yaw_env.registration import ALL_ENV_IDS
+from lean_yaw_env.reporting import reporting
+from lean_yaw_env.validation import require_choice, require_count
 
 from ..evaluation.episodes import RETURN
 from ..registry import env_id_of
@@ -123,19 +126,17 @@ def resumed(
         names = ", ".join(choices)
         raise ValueError(f"a resumed run keeps its own settings; leave out {names}")
     if folder is not None:
-        kind = "series" if is_series(folder) else "run"
-        if kind == "run":
-            read_run(folder)
+        _env_id(folder)
         if _is_done(folder):
-            raise ValueError(f"the {kind} in {str(folder)!r} is finished")
+            raise ValueError(f"the training in {str(folder)!r} is finished")
         return folder
-    env_id = env_id_of(task)
-    records = [
-        path
-        for name in (SERIES_FILE, RUN_FILE)
-        for path in out.glob(f"*/{name}")
-        if read_json(path).get("env_id") == env_id and not _is_done(path.parent)
-    ]
+    env_id, records = env_id_of(task), list[Path]()
+    for path in (*out.glob(f"*/{SERIES_FILE}"), *out.glob(f"*/{RUN_FILE}")):
+        try:
+            if _env_id(path.parent) == env_id and not _is_done(path.parent):
+                records.append(path)
+        except ValueError as error:
+            print(f"left out: {error}", file=sys.stderr)
     if not records:
         raise ValueError(
             f"there is no unfinished training of {task} under {str(out)!r}; start one without --resume"
@@ -150,30 +151,65 @@ def _is_done(folder: Path) -> bool:
 
 def runs_of(folder: Path) -> dict[int, Path]:
     """The runs of a series by seed, or ``ValueError`` if the folder is not one's."""
+    return _read_series(folder)[1]
+
+
+def _read_series(folder: Path) -> tuple[str, dict[int, Path]]:
+    """The environment's id and the runs of a series."""
     record = read_json(folder / SERIES_FILE)
-    if not isinstance(record, dict) or not isinstance(record.get("seeds"), list):
-        raise ValueError(f"{str(folder / SERIES_FILE)!r} is not a series'")
-    return {int(seed): folder / f"seed{seed}" for seed in record["seeds"]}
+    try:
+        env_id = require_choice("env_id", record["env_id"], ALL_ENV_IDS)
+        seeds = [require_count("seed", each, 0, TRAINING_SEEDS - 1) for each in record["seeds"]]
+        if not seeds or len(set(seeds)) < len(seeds):
+            raise ValueError(f"seeds must be different, and one or more, got {seeds}")
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{str(folder / SERIES_FILE)!r} is not a series': {error}") from error
+    return env_id, {seed: folder / f"seed{seed}" for seed in seeds}
+
+
+def _env_id(folder: Path) -> str:
+    """The environment's id of a run or a series, or ``ValueError``."""
+    return _read_series(folder)[0] if is_series(folder) else read_run(folder).env_id
 
 
 def run_series(folder: Path, *, jobs: int = 1, progress: bool = True) -> SeriesResult:
     """Finish the unfinished runs of a series, one after the other or in ``jobs`` processes, and write curves and table.
+
+    A run that fails does not stop the others.
 
     Raises
     ------
     ValueError
         If ``jobs`` is out of its range or a file is damaged.
     RunError
-        If a process fails.
+        If a run fails.
+    BusyError
+        If another process is at work in the folder.
     """
     require_count("jobs", jobs)
     runs = runs_of(folder)
-    unfinished = [place for place in runs.values() if not is_finished(place)]
-    if jobs > 1 and len(unfinished) > 1:
-        run_side_by_side(unfinished, jobs, progress=progress)
-    else:
-        for place in unfinished:
-            run(place, progress=progress)
+    with locked(folder):
+        unfinished = [place for place in runs.values() if not is_finished(place)]
+        if jobs > 1 and len(unfinished) > 1:
+            run_side_by_side(unfinished, jobs, progress=progress)
+        else:
+            _run_each(unfinished, progress)
+        return _finished(folder, runs)
+
+
+def _run_each(folders: Sequence[Path], progress: bool) -> None:
+    failed: list[str] = []
+    for folder in folders:
+        try:
+            run(folder, progress=progress)
+        except (ValueError, LeanYawError) as error:
+            failed.append(f"the training in {str(folder)!r} failed: {error}")
+    if failed:
+        raise RunError("; ".join(failed))
+
+
+def _finished(folder: Path, runs: Mapping[int, Path]) -> SeriesResult:
+    """Draw and write what the finished runs of a series come to."""
     result = _result(runs)
     training = read_run(next(iter(runs.values())))
     median, lowest, highest = next(row[1:4] for row in result.rows() if row[0] == RETURN)
@@ -198,7 +234,7 @@ def run_series(folder: Path, *, jobs: int = 1, progress: bool = True) -> SeriesR
 def run_side_by_side(folders: Sequence[Path], jobs: int, *, progress: bool = True) -> None:
     """Finish runs, ``jobs`` of them at a time, each in a process of its own, under one bar.
 
-    An interruption or the failure of a process ends all processes; their checkpoints stay.
+    A run that fails does not stop the others; an interruption ends all processes, and their checkpoints stay.
 
     Raises
     ------
@@ -208,10 +244,9 @@ def run_side_by_side(folders: Sequence[Path], jobs: int, *, progress: bool = Tru
     # fresh interpreters: torch and compiled threads do not survive a fork
     context = multiprocessing.get_context("spawn")
     done = {folder: context.Value("q", 0) for folder in folders}
-    waiting = deque(folders)
+    waiting, failed = deque(folders), list[str]()
     active: dict[Path, SpawnProcess] = {}
-    total = sum(read_run(folder).settings.steps for folder in folders)
-    bar = tqdm(total=total, unit="step", unit_scale=True, disable=not progress)
+    bar = tqdm(total=sum(map(_steps, folders)), unit="step", unit_scale=True, disable=not progress)
     try:
         while waiting or active:
             while waiting and len(active) < jobs:
@@ -225,19 +260,24 @@ def run_side_by_side(folders: Sequence[Path], jobs: int, *, progress: bool = Tru
             bar.set_description(f"trainings done: {ended} of {len(folders)}", refresh=False)
             wait([process.sentinel for process in active.values()], timeout=0.2)
             for folder in [each for each, process in active.items() if not process.is_alive()]:
-                status = active.pop(folder).exitcode
-                if status != 0:
-                    raise RunError(
-                        f"the training in {str(folder)!r} ended with status {status}; its own message is above, "
-                        "and --resume continues it"
-                    )
+                if (status := active.pop(folder).exitcode) != 0:
+                    failed.append(f"the training in {str(folder)!r} ended with status {status}")
             bar.update(sum(steps.value for steps in done.values()) - bar.n)
+        if failed:
+            raise RunError(f"{'; '.join(failed)}; the messages are above")
     finally:
         bar.close()
         for process in active.values():
             process.terminate()
         for process in active.values():
             process.join()
+
+
+def _steps(folder: Path) -> int:
+    """Steps of a run; 0 of a damaged one, which its own process reports."""
+    with contextlib.suppress(ValueError):
+        return read_run(folder).settings.steps
+    return 0
 
 
 def _run_in_process(folder: Path, done: Any) -> None:
@@ -247,7 +287,8 @@ def _run_in_process(folder: Path, done: Any) -> None:
     def report(steps: int, recent: float) -> None:
         done.value = steps
 
-    run(folder, progress=False, report=report)
+    with reporting("train"):
+        run(folder, progress=False, report=report)
 
 
 def seeds_table(result: SeriesResult) -> Table:
@@ -268,10 +309,17 @@ def _result(runs: Mapping[int, Path]) -> SeriesResult:
     """What the runs' evaluations say, side by side."""
     means: dict[str, dict[str, list[float]]] = {}
     for place in runs.values():
-        for row in read_json(place / EVALUATION_FILE):
-            mean = float("nan") if row["mean"] is None else float(row["mean"])
-            means.setdefault(row["agent"], {}).setdefault(row["metric"], []).append(mean)
-    own = means.pop(read_run(next(iter(runs.values()))).algorithm)
+        try:
+            for row in read_json(place / EVALUATION_FILE):
+                mean = float("nan") if row["mean"] is None else float(row["mean"])
+                means.setdefault(row["agent"], {}).setdefault(row["metric"], []).append(mean)
+        except (KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"the evaluation in {str(place)!r} is damaged: {error}") from error
+    own = means.pop(read_run(next(iter(runs.values()))).algorithm, {})
+    if RETURN not in own or any(len(each) != len(runs) for each in own.values()):
+        raise ValueError(
+            f"the evaluations in {', '.join(map(str, runs.values()))} do not fit together"
+        )
     others = {
         metric: {agent: float(np.mean(found[metric])) for agent, found in means.items()}
         for metric in own

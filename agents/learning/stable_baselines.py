@@ -175,6 +175,8 @@ class StableBaselinesLearner:
         for name, moments in self._moments().items():
             moments.mean, moments.var = state[name]["mean"], state[name]["var"]
             moments.count = float(state[name]["count"])
+            if moments.count < 0.0 or np.any(np.less(moments.var, 0.0)):
+                raise ValueError(f"{name} must have a variance of 0 or more")
         self._normaliser.returns = state["normaliser"]["returns"]
         self._walkers.restore(state["walkers"])
         model.num_timesteps, model._n_updates = int(state["steps"]), int(state["updates"])

@@ -174,12 +174,12 @@ def options_to_plain(options: EnvOptions) -> dict[str, Any]:
 
 def options_from_plain(plain: dict[str, Any]) -> EnvOptions:
     """The options that ``options_to_plain`` wrote, or ``ValueError``."""
-    values = dict(plain)
+    values = dict(_known("options", plain, EnvOptions))
     if "parameters" in values:
         values["parameters"] = WalkerParameters(
             **_known("parameters", values["parameters"], WalkerParameters)
         )
-    return EnvOptions(**_known("options", values, EnvOptions))
+    return EnvOptions(**values)
 
 
 def _changed(record: Any) -> dict[str, Any]:

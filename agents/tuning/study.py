@@ -40,6 +40,8 @@ _WAITING_REPORTS = 5  # of each
 _AS_THEY_ARE = "as_they_are"
 """Marks the trial of the settings that come with the package."""
 _PROCESS = "process"
+_AGAIN = "again"
+"""Marks the trial that tries an unfinished one again, by the number of that one."""
 
 
 @dataclass(frozen=True)
@@ -200,17 +202,25 @@ def _require_study_file(storage: Path, name: str) -> None:
 
 
 def _take_up(study: optuna.Study, space: Space) -> None:
-    """Give up trials whose process was killed, and see that the settings as they are get tried."""
+    """Enqueue the settings as they are in a new study, and again the trials that an interruption or a killed process left unfinished."""
     for trial in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
         host, process = trial.user_attrs.get(_PROCESS, (platform.node(), 0))
         if host == platform.node() and not (process and is_running(process)):
             study.tell(trial.number, state=TrialState.FAIL)
-    kept = study.get_trials(deepcopy=False, states=(*_FINISHED, TrialState.WAITING))
-    if not any(_AS_THEY_ARE in trial.user_attrs for trial in kept):
-        with warnings.catch_warnings():
-            # the settings as they are may lie outside what is searched; Optuna says so and takes these values
-            warnings.simplefilter("ignore", UserWarning)
-            study.enqueue_trial(dict(space.start), user_attrs={_AS_THEY_ARE: True})
+    trials = study.get_trials(deepcopy=False)
+    enqueued = [] if trials else [(dict(space.start), {_AS_THEY_ARE: True})]
+    again = {trial.user_attrs.get(_AGAIN) for trial in trials}
+    for trial in trials:
+        if trial.state is TrialState.FAIL and trial.number not in again:
+            is_first = _AS_THEY_ARE in trial.user_attrs
+            attributes: dict[str, Any] = {_AGAIN: trial.number}
+            attributes |= {_AS_THEY_ARE: True} if is_first else {}
+            enqueued.append((dict(space.start) if is_first else trial.params, attributes))
+    with warnings.catch_warnings():
+        # the settings as they are may lie outside what is searched; Optuna says so and takes these values
+        warnings.simplefilter("ignore", UserWarning)
+        for values, attributes in enqueued:
+            study.enqueue_trial(values, user_attrs=attributes)
 
 
 def _score(trial: optuna.Trial, tuning: Tuning, space: Space, progress: bool) -> float:

@@ -38,6 +38,10 @@ MassOffset = Annotated[
 Out = Annotated[
     Path | None, typer.Option(help="Keep the whole result in this netCDF file; resumes from it.")
 ]
+_MANY_POINTS = 10_000
+"""A map of more points says beforehand what it costs."""
+_RECORD = 2_000.0
+"""Bytes of a point among what is printed."""
 Speeds = Annotated[str, typer.Option(help="Speeds in m/s: a number or low:high:count.")]
 
 
@@ -79,11 +83,24 @@ def stability(
     out: Out = None,
 ) -> Output:
     """Find the gait and its stability at every point of a grid of parameters."""
-    from lean_yaw_env.analysis import stability_map
+    from lean_yaw_env.analysis import map_cost, stability_map
+    from lean_yaw_env.analysis.storage import require_memory
 
+    axes = parse_axes(axis)
+    points = math.prod(values.size for values in axes.values())
+    if points > _MANY_POINTS:
+        require_memory("axes", points, _RECORD)
+        size, seconds = map_cost(
+            walker, axes, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset
+        )
+        size += points * _RECORD
+        typer.echo(
+            f"{points:,} points: about {size / 1e9:.2g} GB of memory and {seconds / 60.0 / threads:.2g} minutes",
+            err=True,
+        )
     data = stability_map(
         walker,
-        parse_axes(axis),
+        axes,
         inter_leg_angle=inter_leg_angle,
         mass_offset=mass_offset,
         path=out,
@@ -239,6 +256,27 @@ def _vehicle(record: records.Record, figure: Any) -> Output:
         records.show_records("eigenvalues, 1/s", record["eigenvalues"])
 
     return Output(record, show, figure)
+
+
+@command()
+def play(
+    env_id: Annotated[str, typer.Argument(help="An environment, such as LeanYaw/Heading-v0.")],
+    speed: Annotated[float, typer.Option(help="Times real time for legs of a metre.")] = 0.5,
+    seed: Annotated[int | None, typer.Option(help="Of the first episode.")] = None,
+) -> Output:
+    """Steer the walker in a window: a and d move the masses left and right, w and s walk faster and slower."""
+    import gymnasium as gym
+    from gymnasium.utils.play import play as play_env
+
+    from lean_yaw_env.envs import RealTime
+
+    try:
+        env = gym.make(env_id, render_mode="rgb_array", mirror=False)
+    except (gym.error.Error, TypeError) as error:
+        raise ValueError(f"env_id must be an environment of lean_yaw_env: {error}") from error
+    window = RealTime(env, speed=speed)
+    still = np.zeros(env.action_space.shape or (), dtype=np.float32)
+    return Output({"env_id": env_id}, lambda: play_env(window, seed=seed, noop=still))
 
 
 @command()
