@@ -301,6 +301,17 @@ def view(
 
 
 @command()
+def findings(
+    out: Annotated[Path, typer.Option(help="Folder for findings.md, findings.csv and images.")],
+) -> Output:
+    """Compute what this software finds beyond the paper: walking on the level, stability over bodies, what chosen steps can save."""
+    from lean_yaw_env.paper.findings import write_findings
+
+    page = write_findings(out, progress=sys.stderr.isatty())
+    return Output({"page": str(page)}, lambda: typer.echo(f"written: {page}"))
+
+
+@command()
 def reproduce(
     names: Annotated[
         list[str],
