@@ -294,7 +294,7 @@ def view(
         typer.echo(f"the page is at {server.address} until Ctrl-C")
         try:
             server.wait()
-        except KeyboardInterrupt:
+        finally:
             server.close()
 
     return Output({"address": server.address}, serve)
