@@ -334,6 +334,35 @@ def closed_loop(
         typer.echo(f"written: {page}", err=True)
 
 
+@app.command("capture")
+@reported("capture")
+def capture(
+    task: Tasks = None,
+    agents: Annotated[str, Option(help="Agents, separated by commas; those that plan, remember or draw are left out.")] = "fixed,feedback,lqr,ppo",
+    out: Annotated[Path | None, Option(help="Folder for capture.csv and images/capture_*.png.")] = None,
+    agent_path: AgentPath = None,
+    runs: Runs = Path("runs"),
+    starts: Annotated[int, Option(help="In the box of starts.")] = 1024,
+    points: Annotated[int, Option(help="To a side of the picture's plane.")] = 61,
+    friction_limit: Annotated[list[float] | None, Option(help="Largest ratio of tangential to normal force; several may be given. The tasks' own is "
+        "inf.", show_default=False)] = None,
+    as_json: AsJson = False,
+) -> None:  # fmt: skip
+    """Hold agents against what can be saved: an exhaustive search over two chosen steps, each followed by the paper's controller."""
+    from .evaluation.capture import examine_captures, show, write_captures
+
+    reports, notes = examine_captures(
+        tasks_in(task or ["Push"]), names_in([agents]), path=agent_path, runs=runs,
+        starts=starts, points=points, friction_limits=friction_limit or [float("inf")],
+    )  # fmt: skip
+    if as_json:
+        typer.echo(dumps([row for each in reports for row in each.rows()], indent=2))
+    else:
+        show(reports, notes)
+    for path in write_captures(reports, out) if out is not None and reports else ():
+        typer.echo(f"written: {path}", err=True)
+
+
 @app.command()
 @reported("film")
 def film(

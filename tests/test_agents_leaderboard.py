@@ -146,6 +146,16 @@ def test_an_agent_that_walked_fewer_episodes_is_compared_on_those():
     assert found.verdict == "worse"
 
 
+def test_a_few_episodes_make_no_claim_however_clear_they_are():
+    results = named(
+        walked("Heading", "lqr", np.full((1, 4), 10.0)),
+        walked("Heading", "mpc", np.full((1, 4), 11.0)),
+    )
+    found = claim(results, "mpc", "lqr")
+    # four equal signs by chance: 2 / 2^4
+    assert found.p_value == 0.125 and found.verdict == "tie"
+
+
 def test_rows_say_against_whom_and_leave_undefined_episodes_uncompared():
     holed = returns(12.0)
     holed[0, 3] = np.nan

@@ -266,6 +266,32 @@ def test_a_damaged_run_is_refused(tmp_path, changes):
         read_run(folder)
 
 
+def test_a_run_keeps_its_options_and_its_agent_is_evaluated_under_any_others(tmp_path):
+    options = EnvOptions(random_body="training", hidden_rates=True, horizon=15.0)
+    arguments = ["--steps", "128", "--episodes", "2", "--out", str(tmp_path)]
+    given = ["random_body=training", "hidden_rates=true", "horizon=15"]
+    arguments += [word for each in given for word in ("--option", each)]
+    result = CliRunner().invoke(train.app, arguments, env={"COLUMNS": "200"})
+    assert result.exit_code == 0, result.output
+    (folder,) = (path.parent for path in tmp_path.glob("*/run.json"))
+    assert read_run(folder).options == options == load(folder).card.options
+    returns = []
+    for others in ([], ["--option", "sensor_noise=0.2"]):
+        command = ["evaluate", "--agent-path", str(folder), "--episodes", "2", "--json", *others]
+        evaluated = CliRunner().invoke(agents_app, command)
+        assert evaluated.exit_code == 0, evaluated.output
+        rows = json.loads(evaluated.stdout)
+        returns += [row["mean"] for row in rows if (row["agent"], row["metric"]) == ("ppo", "return")]  # fmt: skip
+        # the folder stands for its own algorithm; the others are the package's
+        assert {row["agent"]: row["trainings"] for row in rows}.items() >= {
+            "ppo": 1,
+            "apg": 5,
+        }.items()
+    assert len(returns) == 2 and returns[0] != returns[1]
+    with pytest.raises(ValueError, match="must be the environment's own"):
+        ship(folder)
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [

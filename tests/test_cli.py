@@ -21,7 +21,7 @@ from lean_yaw_env.cli.plots import basin_figure, gait_figure, map_figure
 from lean_yaw_env.cli.records import as_json, text_of
 from lean_yaw_env.vehicles import BENCHMARK_2007, benchmark_bicycle
 
-COMMANDS = ("gait", "map", "basin", "bicycle", "skateboard", "reproduce")
+COMMANDS = ("gait", "map", "basin", "bicycle", "skateboard", "reproduce", "play", "view")
 runner = CliRunner()
 
 
@@ -262,6 +262,31 @@ def test_bicycle_benchmark_is_another_bicycle() -> None:
 def test_skateboard_prints_equation_3() -> None:
     record = _json("skateboard", "--spring-stiffness", "0", "--steering-tilt", "0.5")
     assert record["critical_speed"] == pytest.approx(np.sqrt(9.81 * 0.4 * np.tan(0.5) / 2.0))
+
+
+def test_play_opens_a_window_in_which_the_walker_walks(monkeypatch: pytest.MonkeyPatch) -> None:
+    import pygame
+
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    pictures: list[bytes] = []
+
+    def events() -> list[pygame.event.Event]:
+        pictures.append(pygame.image.tobytes(pygame.display.get_surface(), "RGB"))
+        return [pygame.event.Event(pygame.QUIT)] if len(pictures) == 6 else []
+
+    monkeypatch.setattr(pygame.event, "get", events)
+    result = runner.invoke(app, ["play", "LeanYaw/Heading-v0", "--seed", "1"])
+    assert result.exit_code == 0, result.output
+    assert len(set(pictures)) == 6
+    assert not pygame.display.get_init()
+
+
+@pytest.mark.parametrize("env_id", ["LeanYaw/Nowhere-v0", "CartPole-v1"])
+def test_play_refuses_what_is_no_walker(env_id: str) -> None:
+    result = runner.invoke(app, ["play", env_id])
+    assert (
+        result.exit_code == 2 and "env_id must be an environment of lean_yaw_env" in result.output
+    )
 
 
 def test_reproduce_writes_a_report(tmp_path: Path) -> None:

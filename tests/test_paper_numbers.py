@@ -34,6 +34,7 @@ DIFFERENT = {
     "v_min over α, Figure 10 left",
     "v_min over α, Figure 13, π/4",
     "steep slopes",
+    "any combination",
     "turning radius, as drawn",
     "beyond -50 %",
 }

@@ -25,7 +25,7 @@ import agents
 import lean_yaw_env  # noqa: F401 - registers the environments
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.rendering.motion import SECONDS_PER_TIME_UNIT
-from lean_yaw_env.rendering.palette import INK
+from lean_yaw_env.rendering.palette import FLOOR, INK
 from lean_yaw_env.viewer import PageServer
 from lean_yaw_env.walker import Walk
 
@@ -42,10 +42,10 @@ SIZE = (800, 450)
 FPS = 16
 SPEED = 0.75
 """Times real time for legs of a metre on earth."""
-DISTANCE, HEIGHT = 1.95, 0.42
-"""Of the camera from what it looks at, leg lengths."""
-START_ANGLE, TURN = 2.45, 1.75
-"""Of the camera from where the walker heads, to the right, rad: at the start and end, and how far it goes forward between."""
+DISTANCE, HEIGHT = (1.9, 2.6), (0.42, 1.15)
+"""Of the camera from what it looks at, leg lengths: along the floor and up, in the middle of the film and at its ends."""
+START_ANGLE, TURN = 2.5, 1.75
+"""Of the camera from downhill, to the right, rad: at the start and end, and how far it goes forward between."""
 _BROWSER = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]  # fmt: skip
 _STAGE_ALONE = """
 #bar, #panel, #transport, #hud, #notice, #touch, #labels { display: none !important }
@@ -62,8 +62,8 @@ _FRAME = """([duration, seconds, [ahead, up, right], pushes]) => {
   exhibit.frame(duration, seconds);
   const step = exhibit.walk.records.length;
   if (step > before && pushes[step]) exhibit.arrow.show(Math.sign(pushes[step]), 0, 1.6);
-  const { target } = stage.controls, cosine = Math.cos(stage.heading), sine = Math.sin(stage.heading);
-  stage.camera.position.set(target.x + cosine * ahead + sine * right, target.y + up, target.z + cosine * right - sine * ahead);
+  const { x, y, z } = stage.controls.target;
+  stage.camera.position.set(x + ahead, y + up, z + right);
   stage.controls.update();
   stage.render();
   return [step, stage.canvas.toDataURL("image/png").split(",")[1]];
@@ -120,8 +120,12 @@ def frames(walk: Walk) -> Iterator[Image.Image]:
             page.evaluate(_PREPARE)
             page.evaluate("leanYaw.active().start()")
             for k in tqdm(range(count), unit="frame"):
-                angle = START_ANGLE - TURN * math.sin(math.pi * k / count) ** 2
-                place = [DISTANCE * math.cos(angle), HEIGHT, DISTANCE * math.sin(angle)]
+                share = math.sin(math.pi * k / count) ** 2
+                angle = START_ANGLE - TURN * share
+                distance, up = (
+                    near * share + far * (1.0 - share) for near, far in (DISTANCE, HEIGHT)
+                )
+                place = [distance * math.cos(angle), up, distance * math.sin(angle)]
                 duration = SPEED / FPS / SECONDS_PER_TIME_UNIT
                 step, picture = page.evaluate(_FRAME, [duration, 1.0 / FPS, place, pushes])
                 drawn = Image.open(io.BytesIO(base64.b64decode(picture))).convert("RGB")
@@ -132,8 +136,10 @@ def frames(walk: Walk) -> Iterator[Image.Image]:
 def _with_caption(picture: Image.Image, step: int) -> Image.Image:
     words = CAPTIONS[max(first for first in CAPTIONS if first <= step)]
     place = (0.04 * picture.width, 0.93 * picture.height)
-    font = ImageFont.load_default(0.045 * picture.height)
-    ImageDraw.Draw(picture).text(place, words, INK, font, anchor="ls")
+    font = ImageFont.load_default(0.055 * picture.height)
+    pen = ImageDraw.Draw(picture)
+    pen.text(place, words, INK, font, anchor="ls", stroke_width=3, stroke_fill=FLOOR)
+    pen.text(place, words, INK, font, anchor="ls")
     return picture
 
 

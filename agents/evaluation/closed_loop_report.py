@@ -27,6 +27,7 @@ from lean_yaw_env.analysis.many_walks import walk_many
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.errors import LeanYawError, NoGaitError
+from lean_yaw_env.parameters import Vector
 from lean_yaw_env.validation import require_count
 
 from ..agent import Agent
@@ -144,8 +145,8 @@ def share_survived(found: xarray.Dataset) -> float:
     return float((found.ending == 0.0).mean())
 
 
-def box_survival(loop: ClosedLoopMap, starts: int, n_steps: int = STEPS) -> NDArray[np.bool_]:
-    """Which starts are survived of a box around the loop's start, ``REACHES`` wide to either side; the same starts for every agent.
+def box_starts(loop: ClosedLoopMap, starts: int) -> Vector:
+    """States (starts, k) in a box around the loop's start, ``REACHES`` wide to either side; the same starts for every agent.
 
     They are drawn evenly from a fixed seed, so that agents may be compared start by start.
     """
@@ -154,7 +155,12 @@ def box_survival(loop: ClosedLoopMap, starts: int, n_steps: int = STEPS) -> NDAr
     states = np.tile(loop.start, (starts, 1))
     for k, (name, reach) in enumerate(REACHES.items()):
         states[:, loop.names.index(name)] += reach * places[:, k]
-    return walk_many(loop, states, n_steps).require_solved().survived
+    return states
+
+
+def box_survival(loop: ClosedLoopMap, starts: int, n_steps: int = STEPS) -> NDArray[np.bool_]:
+    """Which of ``box_starts`` are survived."""
+    return walk_many(loop, box_starts(loop, starts), n_steps).require_solved().survived
 
 
 def _is_at_limit(gait: LimitCycle, task: str) -> bool:

@@ -61,7 +61,7 @@ class Comparison(NamedTuple):
     iqm: Estimate
     """The difference of the interquartile means; NaN for a share."""
     p_value: float
-    """Two-sided, of the means being equal."""
+    """Two-sided, of the means being equal; no smaller than a sign test's can be on so few episodes."""
     episodes: int
 
 
@@ -70,7 +70,8 @@ def compare(first: Results, second: Results, metric: str) -> Comparison:
     episodes = min(first.episodes, second.episodes)
     difference = first.resampled(metric, episodes).less(second.resampled(metric, episodes))
     iqm = UNDEFINED if is_share(first.task, metric) else difference.iqm_estimate()
-    return Comparison(difference.mean_estimate(), iqm, difference.p_value(), episodes)
+    p_value = max(difference.p_value(), 2.0 ** (1 - episodes))
+    return Comparison(difference.mean_estimate(), iqm, p_value, episodes)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,13 @@ from lean_yaw_env.analysis.attraction import (
     largest_disturbance,
     largest_pushes,
 )
+from lean_yaw_env.analysis.capturability import (
+    Capture,
+    Choices,
+    capture,
+    capture_map,
+    refine_capture,
+)
 from lean_yaw_env.analysis.closed_loop_map import ClosedLoopMap, ControlInterface
 from lean_yaw_env.analysis.contact import FloorDemand, StepDemand, floor_demand
 from lean_yaw_env.analysis.continuation import Branch, Event, continue_gait
@@ -30,6 +37,8 @@ __all__ = [
     "COMMAND_PARAMETERS",
     "ActiveMap",
     "Branch",
+    "Capture",
+    "Choices",
     "ClosedLoopMap",
     "ControlInterface",
     "Disturbance",
@@ -42,6 +51,8 @@ __all__ = [
     "SectionMap",
     "StepDemand",
     "basin",
+    "capture",
+    "capture_map",
     "continue_gait",
     "find_gait",
     "find_limit_cycle",
@@ -54,6 +65,7 @@ __all__ = [
     "map_cost",
     "modes",
     "planar_gait_rate",
+    "refine_capture",
     "save_dataset",
     "section_map_of",
     "stability_map",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +21,15 @@ from lean_yaw_env.analysis.section_map import (
 )
 from lean_yaw_env.analysis.storage import Growing, require_axis
 from lean_yaw_env.parameters import QUARTER_TURN, Vector
-from lean_yaw_env.validation import require_choice, require_count, require_number
+from lean_yaw_env.validation import (
+    require_array,
+    require_choice,
+    require_count,
+    require_flag,
+    require_instance,
+    require_number,
+    require_pair,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -79,10 +87,16 @@ def basin(
         If there is no gait.
     """
     require_count("n_steps", n_steps, 1, 1_000_000)
+    require_flag("progress", progress)
     section_map = section_map_of(walker, **command)
+    if centre is not None:
+        section_map.require_state(require_array("centre", centre, (len(section_map.names),)))
     cycle = find_limit_cycle(section_map) if centre is None else None
     middle = cycle.state if cycle is not None else section_map.require_state(np.asarray(centre))
-    axes, states = slice_of(section_map, x, y, middle)
+    x, y = (require_pair(*axis, "coordinate, values") for axis in (("x", x), ("y", y)))
+    if x[0] == y[0]:
+        raise ValueError(f"x and y must be different coordinates, got {x[0]!r} twice")
+    axes, states = section_grid(section_map, dict((x, y)), middle)
     result: dict[str, Vector] = {
         "steps": np.zeros(len(states)),
         "ending": np.full(len(states), -1.0),
@@ -107,24 +121,25 @@ def basin(
     return growing.dataset()
 
 
-def slice_of(
-    section_map: SectionMap,
-    x: tuple[str, Sequence[float] | Vector],
-    y: tuple[str, Sequence[float] | Vector],
-    centre: Vector,
+def section_grid(
+    section_map: SectionMap, axes: Mapping[str, Sequence[float] | Vector], centre: Vector
 ) -> tuple[dict[str, Vector], Vector]:
-    """The axes of a plane of the section through a state (k,), and the states (n, k) at its points, or ``ValueError``."""
-    if x[0] == y[0]:
-        raise ValueError(f"x and y must be different coordinates, got {x[0]!r} twice")
-    axes: dict[str, Vector] = {}
-    for name, values in (x, y):
+    """The axes of a slice or box of the section, and the states (n, k) at its points, the other coordinates those of ``centre`` (k,).
+
+    Raises
+    ------
+    ValueError
+        If a name is no coordinate, or its values do not grow or leave its range.
+    """
+    checked: dict[str, Vector] = {}
+    for name, values in axes.items():
         _index(section_map, name)
         bound = QUARTER_TURN if name in _BOUNDED else 1e6
-        axes[name] = require_axis(f"values of {name}", values, -bound, bound)
-    columns = [grid.ravel() for grid in np.meshgrid(*axes.values(), indexing="ij")]
+        checked[name] = require_axis(f"values of {name}", values, -bound, bound)
+    columns = [grid.ravel() for grid in np.meshgrid(*checked.values(), indexing="ij")]
     states = np.tile(centre, (columns[0].size, 1))
-    states[:, [section_map.names.index(name) for name in axes]] = np.column_stack(columns)
-    return axes, states
+    states[:, [section_map.names.index(name) for name in checked]] = np.column_stack(columns)
+    return checked, states
 
 
 @dataclass(frozen=True)
@@ -192,6 +207,8 @@ def largest_disturbance(
     SolverError
         If the integrator fails.
     """
+    require_flag("upward", upward)
+    require_flag("relative", relative)
     require_number("most", most, 0.0, 1e6, "(]")
     require_number("tolerance", tolerance, 0.0, most, "(]")
     section_map = section_map_of(walker, **command)
@@ -262,6 +279,7 @@ def largest_pushes(
     SolverError
         If the integrator fails.
     """
+    require_instance("cycle", cycle, LimitCycle)
     require_count("directions", directions, 1, 3600)
     require_number("most", most, 0.0, 100.0, "(]")
     angles = 2.0 * np.pi * np.arange(directions) / directions

@@ -244,8 +244,13 @@ class ClosedLoopMap(SectionMap):
     def step_many(
         self, states: Vector, carried: Vector, foot: int
     ) -> tuple[Vector, Vector, Vector]:
-        commands = np.column_stack([self.commands(states, FEET_IN_TURN[foot]), states[:, OFFSET]])
-        rows = step_rows(self._bodies, commands, states[:, :STATE_SIZE], foot)
+        return self.step_commanded(states, carried, self.commands(states, FEET_IN_TURN[foot]), foot)
+
+    def step_commanded(
+        self, states: Vector, carried: Vector, commands: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
+        whole = np.column_stack([commands, states[:, OFFSET]])
+        rows = step_rows(self._bodies, whole, states[:, :STATE_SIZE], foot)
         after = states.copy()
         after[:, :STATE_SIZE], after[:, OFFSET] = rows[:, :STATE_SIZE], rows[:, _OFFSET_OUT]
         done = rows[:, _STATUS] == STEPPED

@@ -33,6 +33,8 @@ from lean_yaw_env.walker import Walker
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
+    from lean_yaw_env.viewer import PageDisplay
+
 OF_STEPS = (
     "duration", "displacement", "least_normal_force", "greatest_friction", "gravity_work", "shift_work"
 )  # fmt: skip
@@ -131,6 +133,26 @@ class LimitCycle:
         """Work of gravity and of moving the masses, per weight and distance."""
         return self.gravity_work + self.shift_work
 
+    def show(self, n_steps: int = 40, height: int = 620) -> PageDisplay:
+        """So many steps of the gait on the web page, for a notebook; ``height`` is in pixels. See ``Walk.show``.
+
+        Raises
+        ------
+        ValueError
+            If it is no gait of a ``Walker`` with constant commands.
+        """
+        if not isinstance(self.section_map, ActiveMap):
+            raise ValueError(f"only a Walker's gait can be shown, got one of {self.section_map}")
+        commands = [self.steps[k % len(self.steps)].command for k in range(n_steps)]
+        walk = self.section_map.walker.walk(
+            n_steps,
+            state=self.state,
+            inter_leg_angle=[command.inter_leg_angle for command in commands],
+            mass_offset=[command.mass_offset for command in commands],
+            previous_offset=commands[0].previous_offset,
+        )
+        return walk.show(height)
+
     @cached_property
     def turning_radius(self) -> float:
         """Of the circle on which the middle of the hip axle walks, see ``path.turning_radius``; infinite without a turn."""
@@ -202,7 +224,7 @@ def find_limit_cycle(walker: WalkerOrMap, **command: Unpack[CommandArguments]) -
 def find_gait(walker: Walker, **command: Unpack[CommandArguments]) -> Vector:
     """The section state of ``find_limit_cycle`` alone, on the left foot, to the same residual.
 
-    The root finder estimates its own slopes here, so that nothing but the step itself is compiled.
+    The root finder estimates its own slopes here, so that nothing but the step itself is compiled; where that fails, it gets the Jacobian.
 
     Raises
     ------
@@ -212,7 +234,10 @@ def find_gait(walker: Walker, **command: Unpack[CommandArguments]) -> Vector:
     section_map = section_map_of(walker, **command)
     if not isinstance(section_map, ActiveMap):
         raise ValueError(f"walker must be a Walker, got {walker!r}")
-    return search_active(section_map, exact=False)
+    try:
+        return search_active(section_map, exact=False)
+    except NoGaitError:
+        return search_active(section_map, exact=True)
 
 
 def find_passive_gaits(walker: PassiveWalker) -> tuple[LimitCycle, ...]:

@@ -63,8 +63,17 @@ class ManyWalks:
         return self
 
 
-def walk_many(section_map: SectionMap, states: Vector, n_steps: int) -> ManyWalks:
-    """Walk ``n_steps`` from each of states (n, k), left foot first; how many steps the map itself takes plays no part.
+def walk_many(
+    section_map: SectionMap,
+    states: Vector,
+    n_steps: int,
+    *,
+    foot: int = 0,
+    carried: Vector | None = None,
+) -> ManyWalks:
+    """Walk ``n_steps`` from each of states (n, k) on the left (0) or right (1) foot; how many steps the map itself takes plays no part.
+
+    ``carried`` (n,) is what the first step finds of an earlier one, by default the map's.
 
     Raises
     ------
@@ -76,16 +85,16 @@ def walk_many(section_map: SectionMap, states: Vector, n_steps: int) -> ManyWalk
     steps, endings = np.zeros(len(current), dtype=np.int64), np.zeros(len(current))
     for first in range(0, len(current), _CHUNK):
         walking = np.arange(first, min(first + _CHUNK, len(current)))
-        carried = np.full(walking.size, section_map.carried)
+        found = np.full(walking.size, section_map.carried) if carried is None else carried[walking]
         for k in range(n_steps):
             if not walking.size:
                 break
-            after, carried, status = section_map.step_many(current[walking], carried, k % 2)
+            after, found, status = section_map.step_many(current[walking], found, (foot + k) % 2)
             done = status == records.STEPPED
             # the integrator's failure leaves nothing that means anything
             known = status != records.FAILED
             current[walking[known]] = after[known]
             steps[walking[done]] += 1
             endings[walking[~done]] = status[~done]
-            walking, carried = walking[done], carried[done]
+            walking, found = walking[done], found[done]
     return ManyWalks(steps, endings, current)

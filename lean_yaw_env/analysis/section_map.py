@@ -173,6 +173,12 @@ class SectionMap(ABC):
         Returns states (n, k), what is carried on (n,) and the statuses (n,) of ``kernel.records``.
         """
 
+    def step_commanded(
+        self, states: Vector, carried: Vector, commands: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
+        """``step_many`` at inter-leg angles and mass offsets (n, 2) of one's own choice, or ``ValueError`` where the walker takes none."""
+        raise ValueError(f"a walker that takes commands is needed, got {self.walker!r}")
+
     @abstractmethod
     def search(self) -> Iterator[Vector]:
         """States of the gaits that the map is known to have, the best first, or ``NoGaitError`` saying what was tried."""
@@ -201,6 +207,7 @@ class SectionMap(ABC):
 
     def along(self, parameter: str) -> Self:
         """The map over as many steps as its gaits repeat in at every value of a parameter."""
+        require_choice("parameter", parameter, self.parameters)
         return self
 
     def question(self) -> dict[str, Any]:

@@ -259,6 +259,27 @@ def _vehicle(record: records.Record, figure: Any) -> Output:
 
 
 @command()
+def play(
+    env_id: Annotated[str, typer.Argument(help="An environment, such as LeanYaw/Heading-v0.")],
+    speed: Annotated[float, typer.Option(help="Times real time for legs of a metre.")] = 0.5,
+    seed: Annotated[int | None, typer.Option(help="Of the first episode.")] = None,
+) -> Output:
+    """Steer the walker in a window: a and d move the masses left and right, w and s walk faster and slower."""
+    import gymnasium as gym
+    from gymnasium.utils.play import play as play_env
+
+    from lean_yaw_env.envs import RealTime
+
+    try:
+        env = gym.make(env_id, render_mode="rgb_array", mirror=False)
+    except (gym.error.Error, TypeError) as error:
+        raise ValueError(f"env_id must be an environment of lean_yaw_env: {error}") from error
+    window = RealTime(env, speed=speed)
+    still = np.zeros(env.action_space.shape or (), dtype=np.float32)
+    return Output({"env_id": env_id}, lambda: play_env(window, seed=seed, noop=still))
+
+
+@command()
 def view(
     walk: Annotated[Path | None, typer.Option(help="Show this walk, saved with Walk.save.")] = None,
     port: Annotated[int, typer.Option(help="Of this machine; 0 takes a free one.")] = 0,
@@ -277,6 +298,17 @@ def view(
             server.close()
 
     return Output({"address": server.address}, serve)
+
+
+@command()
+def findings(
+    out: Annotated[Path, typer.Option(help="Folder for findings.md, findings.csv and images.")],
+) -> Output:
+    """Compute what this software finds beyond the paper: walking on the level, stability over bodies, what chosen steps can save."""
+    from lean_yaw_env.paper.findings import write_findings
+
+    page = write_findings(out, progress=sys.stderr.isatty())
+    return Output({"page": str(page)}, lambda: typer.echo(f"written: {page}"))
 
 
 @command()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import math
 from collections.abc import Callable, Iterable
 from functools import wraps
 from pathlib import Path
@@ -18,12 +17,11 @@ from lean_yaw_env.parameters import Vector, WalkerParameters
 from lean_yaw_env.passive import PassiveWalker
 from lean_yaw_env.rendering.figures import ENDINGS, save_figure
 from lean_yaw_env.reporting import keep, reporting
+from lean_yaw_env.validation import require_count
 from lean_yaw_env.walker import Walker
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-MOST_POINTS = 100_000
 
 
 class Output(NamedTuple):
@@ -135,21 +133,20 @@ def parse_range(text: str, name: str = "range") -> Vector:
     ValueError
         If it is neither, low is not below high, or the count is not in [2, 100000].
     """
-    fields = text.split(":")
     form = f"{name} must be a number or low:high:count, such as 0.1:0.8:15, got {text!r}"
+    fields = text.split(":")
     try:
-        numbers = [float(field) for field in fields[:2]]
-        count = int(fields[2]) if len(fields) == 3 else 1
+        numbers = np.array(fields[:2], dtype=float)
+        count = int(fields[2]) if len(fields) > 2 else 1
     except ValueError as error:
         raise ValueError(form) from error
-    if len(fields) not in (1, 3) or not all(math.isfinite(number) for number in numbers):
+    if len(fields) not in (1, 3) or not np.isfinite(numbers).all():
         raise ValueError(form)
     if len(fields) == 1:
-        return np.array(numbers)
+        return numbers
     if not numbers[0] < numbers[1]:
         raise ValueError(f"{name} must rise from low to high, got {text!r}")
-    if not 2 <= count <= MOST_POINTS:
-        raise ValueError(f"{name}: the count must be in [2, {MOST_POINTS}], got {count}")
+    require_count(f"{name}: the count", count, 2, 100_000)
     return np.linspace(numbers[0], numbers[1], count)
 
 

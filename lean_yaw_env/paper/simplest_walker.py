@@ -14,17 +14,14 @@ from lean_yaw_env.analysis import (
     find_periodic_gait,
 )
 from lean_yaw_env.analysis.fixed_point import solve_fixed_point
-from lean_yaw_env.analysis.limit_cycle import sorted_eigenvalues
 from lean_yaw_env.errors import FellError
 from lean_yaw_env.paper.checks import Check, Result, Section, assess, compare, compare_all, printed
-from lean_yaw_env.paper.walkers import doubling_slope, point_foot_walker
+from lean_yaw_env.paper.walkers import doubling_slope, eigenvalues, point_foot_walker
 
 GARCIA_SLOPE = 0.009
 """Slope of the published gaits."""
 _FEIGENBAUM = 4.669201609
 _SERIES_SLOPES = (3e-4, GARCIA_SLOPE)
-_WIDTH, _WEIGHTS = 5e-5, np.array([45.0, -9.0, 1.0])
-"""Of central differences with six neighbours."""
 
 
 @lru_cache(maxsize=16)
@@ -33,18 +30,10 @@ def gaits(slope: float = GARCIA_SLOPE) -> tuple[LimitCycle, ...]:
     return find_passive_gaits(point_foot_walker(slope))
 
 
-def step_multipliers(gait: LimitCycle, slope: float = GARCIA_SLOPE) -> np.ndarray:
-    """Multipliers of one step, the greatest first, from differences of steps that are exact to the sixth order."""
-    section_map = PassiveMap(point_foot_walker(slope))
-    columns = []
-    for unit in np.eye(gait.state.size)[section_map.free]:
-        changes = [
-            section_map.image(gait.state + k * _WIDTH * unit)
-            - section_map.image(gait.state - k * _WIDTH * unit)
-            for k in (1, 2, 3)
-        ]
-        columns.append(_WEIGHTS @ np.array(changes)[:, section_map.free] / (60.0 * _WIDTH))
-    return sorted_eigenvalues(np.array(columns).T)
+def step_multipliers(gait: LimitCycle) -> np.ndarray:
+    """Multipliers of one step, by falling magnitude."""
+    section_map = gait.section_map
+    return eigenvalues(section_map.derivative(gait.state)[1], section_map.free)
 
 
 def simplest_walker() -> Result:
