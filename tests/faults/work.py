@@ -30,9 +30,8 @@ SETTINGS: dict[str, Any] = {
 def begin(kind: str, folder: Path) -> None:
     """What there is before the work begins."""
     if kind in SETTINGS:
-        env_id = GOAL_ENV_ID if kind == "her" else HEADING
         training = Training(
-            env_id, 0, SETTINGS[kind], SHORT, episodes=2, checkpoint_seconds=0.0, algorithm=kind
+            HEADING, 0, SETTINGS[kind], SHORT, episodes=2, checkpoint_seconds=0.0, algorithm=kind
         )
         make_run(training, folder / "run")
     elif kind == "series":
