@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import typer
+from lean_yaw_env.reporting import reporting
 
-from agents.training_commands import train
+with reporting("train"):
+    import typer
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-app.command()(train)
+    from agents.command_line import train
+
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    app.command()(train)
 
 if __name__ == "__main__":
     app()

@@ -1,14 +1,10 @@
 """``python -m agents``; needs the libraries of ``lean-yaw-env[train]``."""
 
-import sys
-
-from lean_yaw_env.extras import MissingLibraryError, needs_extra
+from lean_yaw_env.extras import needs_extra
+from lean_yaw_env.reporting import reporting
 
 if __name__ == "__main__":
-    try:
-        with needs_extra("train"):
-            from .command_line import app
+    with reporting("agents"), needs_extra("train"):
+        from .command_line import app
 
-            app(prog_name=f"python -m {__package__}")
-    except MissingLibraryError as error:
-        sys.exit(f"{__package__}: {error}")
+        app(prog_name=f"python -m {__package__}")

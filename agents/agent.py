@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 State = tuple[NDArray[Any], ...] | None
-"""What an agent remembers from one call to the next; None for those that remember nothing."""
+"""What an agent remembers from one call to the next; None for no memory."""
 
 
 class Agent(Protocol):
@@ -25,13 +25,10 @@ class Agent(Protocol):
 
         Parameters
         ----------
-        observation : shape (..., features)
-            As the environment gives it.
+        observation : shape (..., features), as the environment gives it
         state : what the last call returned; None at first
-        episode_start : shape (...), optional
-            Where a new episode begins, so that what is remembered of the last one is dropped.
-        deterministic : bool
-            Take the best action rather than draw one.
+        episode_start : shape (...); where a new episode begins, and the memory of the last one is dropped
+        deterministic : take the best action rather than draw one
 
         Returns
         -------

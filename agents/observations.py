@@ -57,13 +57,23 @@ class ObservationLayout:
         )
 
     def require(self, observation: ArrayLike | Mapping[str, Any]) -> NDArray[np.float32]:
-        """The observation as an array of shape (..., features), or ``ValueError``; that of ``WaypointGoalEnv`` as seen from the walker."""
+        """The observation as an array of shape (..., features), that of ``WaypointGoalEnv`` as seen from the walker.
+
+        Raises
+        ------
+        ValueError
+            If it has another shape, or a number is not finite.
+        """
         if isinstance(observation, Mapping):
-            observation = seen_from_walker(
-                observation, mirror=COMMON_NAMES[STANCE_FOOT] not in self.names
-            )
-        array = np.asarray(observation, dtype=np.float32)
-        if array.ndim == 0 or array.shape[-1] != len(self.names):
+            mirror = COMMON_NAMES[STANCE_FOOT] not in self.names
+            try:
+                observation = seen_from_walker(observation, mirror=mirror)
+            except (KeyError, IndexError, TypeError) as error:
+                raise ValueError(
+                    f"observation must be as the environment gives it, got {observation!r}"
+                ) from error
+        array = require_observation(observation)
+        if array.shape[-1] != len(self.names):
             raise ValueError(
                 f"observation must have shape (..., {len(self.names)}) of {', '.join(self.names)}, got {array.shape}"
             )
@@ -73,3 +83,13 @@ class ObservationLayout:
         """A quantity of observations (..., features) in its own unit, shape (...)."""
         column = self.names.index(name)
         return self.centres[column] + self.scales[column] * observation[..., column].astype(float)
+
+
+def require_observation(observation: ArrayLike) -> NDArray[np.float32]:
+    """Observations of any task as an array of shape (..., features), or ``ValueError`` if they are not finite numbers."""
+    array = np.asarray(observation)
+    if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+        raise ValueError(f"observation must hold finite numbers, got {observation!r}")
+    if array.ndim == 0:
+        raise ValueError(f"observation must have shape (..., features), got {array.shape}")
+    return array.astype(np.float32, copy=False)

@@ -18,6 +18,7 @@ from .agent import Agent
 from .controllers.guidance import guided
 from .controllers.mpc import MpcController
 from .controllers.simple import FixedController, HeadingFeedback, RandomController
+from .observations import ObservationLayout
 from .policies.policy_files import (
     CARD_FILE,
     DEFAULT_ALGORITHM,
@@ -28,7 +29,7 @@ from .policies.policy_files import (
 )
 
 Kind = Literal["baseline", "feedback", "planner", "learned"]
-"""What an agent rests on: nothing, a law from its observation, a search on the walker itself at every step, or a training."""
+"""How an agent chooses: blindly, by feedback from its observation, by a search on the walker itself at every step, or as it was trained."""
 KINDS: tuple[Kind, ...] = get_args(Kind)
 QUICK_KINDS: tuple[Kind, ...] = ("baseline", "feedback", "learned")
 """Kinds that take next to no time to act."""
@@ -36,15 +37,9 @@ QUICK_KINDS: tuple[Kind, ...] = ("baseline", "feedback", "learned")
 
 @dataclass(frozen=True)
 class AgentRequest:
-    """What an agent is made for.
+    """What an agent is made for: an environment's id and options, a seed for agents that draw, and where trained policies are.
 
-    Attributes
-    ----------
-    env_id : an environment's id
-    options : the environment's
-    seed : for agents that draw
-    path : folder of a trained policy, for agents that are trained; the newest under ``runs``, or the package's own, otherwise
-    runs : where trainings leave their folders; None for the package's own whatever was trained since
+    A trained policy is the one in the folder ``path``; without it the newest under ``runs``; without that the package's own.
     """
 
     env_id: str
@@ -56,18 +51,15 @@ class AgentRequest:
 
 @dataclass(frozen=True)
 class AgentEntry:
-    """An agent of the registry.
-
-    Attributes
-    ----------
-    kind : Kind
-    make : makes it for a request
-    tasks : names of those that it is for
-    """
+    """An agent of the registry: its kind, what makes it for a request, and the names of the tasks that it is for."""
 
     kind: Kind
     make: Callable[[AgentRequest], Agent]
     tasks: tuple[str, ...] = ALL_TASKS
+
+
+def _layout(request: AgentRequest) -> ObservationLayout:
+    return ObservationLayout.of(task_of(request.env_id), request.options)
 
 
 def _feedback(request: AgentRequest) -> Agent:
@@ -96,8 +88,8 @@ def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
 
 
 AGENTS: dict[str, AgentEntry] = {
-    "random": AgentEntry("baseline", lambda request: RandomController(request.seed)),
-    "fixed": AgentEntry("baseline", lambda request: FixedController()),
+    "random": AgentEntry("baseline", lambda asked: RandomController(asked.seed, _layout(asked))),
+    "fixed": AgentEntry("baseline", lambda asked: FixedController(_layout(asked))),
     "feedback": AgentEntry("feedback", _feedback, ("Heading", "SpeedHeading", "UTurn", "Level")),
     "lqr": AgentEntry("feedback", _lqr),
     "mpc": AgentEntry("planner", _mpc, tuple(TASK_VERSIONS)),
@@ -120,7 +112,7 @@ def agent_colour(name: str) -> tuple[float, float, float]:
 
 
 def make_agent(name: str, request: AgentRequest) -> Agent:
-    """Make an agent.
+    """Make an agent by its name.
 
     Raises
     ------

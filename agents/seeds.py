@@ -1,25 +1,28 @@
-"""Which environment seeds are whose, so that no agent is judged on an episode it was trained or tuned on.
+"""Three sets of episodes, apart by construction: for training, for validation and for the test.
 
-| environment seeds | for |
-|---|---|
-| 0 to 2^31 - 2^20 - 1 | training: walker i of seed s has 2^12 s + i, so that no two seeds share a walker |
-| 2^31 - 2^20 to 2^31 - 1 | tuning of controllers |
-| from 2^31 | evaluation: episode i of seed s has 2^31 + 2^20 s + i |
+| environment seeds | set | read by |
+|---|---|---|
+| 0 to 2^31 - 1 | training: walker i of seed s has 2^12 s + i, so that no two seeds share a walker | learners |
+| 2^31 to 2^51 + 2^31 - 1 | test: episode i of seed s has 2^31 + 2^20 s + i | the command that writes the leaderboard, and nothing else |
+| from 2^52 | validation: episode i of seed s has 2^52 + 2^20 s + i | evaluations of trainings, learning curves, tuners, films |
 """
 
 from __future__ import annotations
 
-from lean_yaw_env.validation import require_count
+from typing import Literal
+
+from lean_yaw_env.validation import require_choice, require_count
+
+EpisodeSet = Literal["validation", "test"]
 
 MOST_WALKERS = 2**12
 """Walkers of one training at most."""
-TRAINING_SEEDS = 2**19 - 2**8
+TRAINING_SEEDS = 2**19
 """Seeds of trainings are below."""
-TUNING_SEEDS = 2**31 - 2**20
 MOST_EPISODES = 2**20
-"""Episodes of one evaluation, or of all tuning, at most."""
-EVALUATION_SEEDS = 2**31
+"""Episodes of one evaluation at most."""
 MOST_EVALUATIONS = 2**31
+_FIRST: dict[EpisodeSet, int] = {"test": 2**31, "validation": 2**52}
 
 
 def training_seed(seed: int) -> int:
@@ -27,7 +30,8 @@ def training_seed(seed: int) -> int:
     return MOST_WALKERS * require_count("seed", seed, 0, TRAINING_SEEDS - 1)
 
 
-def evaluation_seed(seed: int) -> int:
-    """The environment seed of the first episode of an evaluation, or ``ValueError``."""
+def first_seed(episode_set: EpisodeSet, seed: int = 0) -> int:
+    """The environment seed of an evaluation's first episode, or ``ValueError``."""
+    require_choice("episode_set", episode_set, _FIRST)
     number = require_count("seed", seed, 0, MOST_EVALUATIONS - 1)
-    return EVALUATION_SEEDS + MOST_EPISODES * number
+    return _FIRST[episode_set] + MOST_EPISODES * number

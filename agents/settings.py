@@ -1,6 +1,6 @@
 """The settings that come with the package, of controllers and learners alike: ``settings.json`` holds them by agent and task.
 
-Each number stands under its path within the agent's settings, as ``weights.heading``; whatever is not there has the default of the agent's class.
+Each value stands under its path within the agent's settings, as ``weights.heading``; whatever is not there has the default of the agent's class.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -66,25 +67,20 @@ def with_values(settings: Settings, values: Mapping[str, Any]) -> Settings:
     return replace(settings, **own)  # type: ignore[type-var]
 
 
-def values_of(settings: Any) -> Values:
-    """The values in which settings differ from the default ones of their class, by their paths: what ``with_values`` takes."""
-    return _differences(settings, type(settings)())
-
-
-def value_at(settings: Any, path: str) -> Any:
-    """The value at a path."""
-    for name in path.split("."):
-        settings = getattr(settings, name)
-    return settings
-
-
-def _differences(settings: Any, default: Any) -> Values:
+def values_of(settings: Any, default: Any = None) -> Values:
+    """The values in which settings differ from others, by default those of their class, by their paths: what ``with_values`` takes."""
+    default = type(settings)() if default is None else default
     found: Values = {}
     for field in fields(settings):
         value, other = getattr(settings, field.name), getattr(default, field.name)
         if is_dataclass(value):
-            inner = _differences(value, other)
+            inner = values_of(value, other)
             found |= {f"{field.name}.{path}": each for path, each in inner.items()}
         elif value != other:
             found[field.name] = list(value) if isinstance(value, tuple) else value
     return found
+
+
+def value_at(settings: Any, path: str) -> Any:
+    """The value at a path."""
+    return attrgetter(path)(settings)

@@ -20,28 +20,22 @@ def ship(source: Path, *, replace: bool = False) -> list[Path]:
     Parameters
     ----------
     source : folder of a finished run or series that ``train`` left, or JSON file that ``tune`` left
-    replace : whether something else may be there already
+    replace : whether to replace what is there already
 
     Raises
     ------
     ValueError
-        If the source is none of these or not finished, or something is there already and ``replace`` is not set.
+        If the source is none of these or not finished, a run's options are not the environment's own, or something is there already and
+        ``replace`` is not set. That run or file has changed nothing then.
     """
     if source.is_file():
-        return [ship_settings(source, replace=replace)]
+        return [_ship_settings(source, replace)]
     runs = runs_of(source).values() if is_series(source) else (source,)
-    return [ship_policy(run, replace=replace) for run in runs]
+    return [_ship_policy(run, replace) for run in runs]
 
 
-def ship_policy(run: Path, *, replace: bool = False) -> Path:
-    """Copy a finished run's policy, and how it was judged, to where ``load`` finds the package's agents.
-
-    Raises
-    ------
-    ValueError
-        If the run is not finished, it trained for other than the environment's own options, or there is an agent already and
-        ``replace`` is not set; nothing has changed then.
-    """
+def _ship_policy(run: Path, replace: bool) -> Path:
+    """Copy a finished run's policy and its evaluation to where ``load`` finds the package's agents."""
     card = (policy := load(run)).card
     evaluation = run / EVALUATION_FILE
     if not evaluation.exists():
@@ -59,15 +53,8 @@ def ship_policy(run: Path, *, replace: bool = False) -> Path:
     return folder
 
 
-def ship_settings(file: Path, *, replace: bool = False) -> Path:
-    """Put the best settings of a tuning among those that come with the package.
-
-    Raises
-    ------
-    ValueError
-        If the file is not a tuning's, its values are not settings of its agent, or there are other ones already and ``replace`` is
-        not set; nothing has changed then.
-    """
+def _ship_settings(file: Path, replace: bool) -> Path:
+    """Put the best settings of a tuning among those that come with the package."""
     record = read_json(file)
     try:
         agent, task, values = (record[key] for key in ("agent", "task", "values"))

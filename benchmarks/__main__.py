@@ -10,8 +10,7 @@ from pathlib import Path
 from benchmarks import environments, kernel, startup, training
 from benchmarks.compare import as_text as comparison_text
 from benchmarks.compare import compare, save_plot
-from benchmarks.machine import machine
-from benchmarks.measurements import as_json, as_text
+from benchmarks.measure import as_json, as_text, machine
 from lean_yaw_env.files import write_text
 
 RESULTS = Path(__file__).parent / "results"

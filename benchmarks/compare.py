@@ -8,20 +8,18 @@ peer says what its step is instead.
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium as gym
 
 from benchmarks.environments import HEADING, single_steps, vector_steps, walkers
 from benchmarks.kernel import all_steps, single_step, two_cores
-from benchmarks.machine import machine
-from benchmarks.measure import FULL, SMALLEST, Effort, measure
+from benchmarks.measure import FULL, SMALLEST, machine, measure, parser
 from benchmarks.populations import perturbed_gait
 from benchmarks.scipy_step import ScipyStep
 from lean_yaw_env.rendering.figures import new_figure, save_figure
@@ -33,8 +31,7 @@ BATCH = 4096
 EULER = "one Euler step of 0.02 s; no contact, no error control"
 
 
-@dataclass(frozen=True)
-class Case:
+class Case(NamedTuple):
     """One line of the comparison: ``steps`` steps in a call of ``play``."""
 
     name: str
@@ -64,19 +61,14 @@ def _own_cases(n: int, batch: int, steps: int) -> list[Case]:
         Case("kernel, batch", all_steps(population), batch, own, True),
         Case("kernel, single call", single_step(perturbed_gait(1)), 1, own, True),
         Case(f"{HEADING}, vector of {n}", vector_steps(walkers(n), "fixed"), n, "and the task", True),
-        Case(
-            f"{HEADING}, vector of {n}, masses moving", vector_steps(walkers(n), "random"), n,
-            "random actions", True,
-        ),
+        Case(f"{HEADING}, vector of {n}, masses moving", vector_steps(walkers(n), "random"), n, "random actions", True),
         Case(HEADING, single_steps(HEADING, steps, "fixed"), steps, "unwrapped, Python", True),
-        Case(
-            f"{HEADING}, masses moving", single_steps(HEADING, steps, "random"), steps,
-            "random actions", True,
-        ),
+        Case(f"{HEADING}, masses moving", single_steps(HEADING, steps, "random"), steps, "random actions", True),
     ]  # fmt: skip
 
 
-def _classic_cases(n: int, steps: int) -> list[Case]:
+def _other_cases(n: int, steps: int) -> list[Case]:
+    """Peers; MuJoCo and EnvPool are measured where they are installed."""
     cases = []
     for env_id, note in (
         ("CartPole-v1", EULER),
@@ -88,46 +80,30 @@ def _classic_cases(n: int, steps: int) -> list[Case]:
             Case(f"{env_id}, SyncVectorEnv of {n}", vector_steps(sync, "random"), n, note),
         ]
     native = gym.make_vec("CartPole-v1", num_envs=n, vectorization_mode="vector_entry_point")
-    return [
-        *cases,
-        Case(f"CartPole-v1, native vector of {n}", vector_steps(native, "random"), n, EULER),
-    ]
-
-
-def _optional_cases(n: int, steps: int) -> list[Case]:
-    """Peers that are measured where they are installed."""
-    cases = []
+    name = f"CartPole-v1, native vector of {n}"
+    cases.append(Case(name, vector_steps(native, "random"), n, EULER))
     if importlib.util.find_spec("mujoco"):
-        cases.append(
-            Case(
-                "Walker2d-v5 (MuJoCo)", single_steps("Walker2d-v5", steps, "random"), steps,
-                "4 fixed steps of 0.002 s, soft contact: a walking step takes some hundred",
-            )
-        )  # fmt: skip
+        note = "4 fixed steps of 0.002 s, soft contact: a walking step takes some hundred"
+        play = single_steps("Walker2d-v5", steps, "random")
+        cases.append(Case("Walker2d-v5 (MuJoCo)", play, steps, note))
     if importlib.util.find_spec("envpool"):
         import envpool  # pyright: ignore[reportMissingImports]
 
         pool = envpool.make_gymnasium("CartPole-v1", num_envs=n, num_threads=1)
         cases.append(Case(f"CartPole-v1, EnvPool of {n}", vector_steps(pool, "random"), n, EULER))
-    return cases
-
-
-def _scipy_case() -> Case:
     scipy = ScipyStep(perturbed_gait(8))
-    return Case(
-        "scipy solve_ivp (DOP853)", lambda: [scipy.step(i) for i in range(8)], 8,
-        "the same walking step at the same accuracy, compiled right-hand side",
-    )  # fmt: skip
+    note = "the same walking step at the same accuracy, compiled right-hand side"
+    scipy_steps = Case(
+        "scipy solve_ivp (DOP853)", lambda: [scipy.step(i) for i in range(8)], 8, note
+    )
+    return [*cases, scipy_steps]
 
 
 def compare(smallest: bool) -> list[Speed]:
     """All cases, fastest first."""
     n, batch, steps = (4, 16, 4) if smallest else (VECTOR, BATCH, 200)
-    effort: Effort = SMALLEST if smallest else FULL
-    cases = [
-        *_own_cases(n, batch, steps), *_classic_cases(n, steps), *_optional_cases(n, steps),
-        _scipy_case(),
-    ]  # fmt: skip
+    effort = SMALLEST if smallest else FULL
+    cases = [*_own_cases(n, batch, steps), *_other_cases(n, steps)]
     seconds = {}
     for threads in (1, 2):
         group = {case.name: case.play for case in cases if case.threads == threads}
@@ -168,16 +144,15 @@ def save_plot(speeds: list[Speed], machine: Mapping[str, Any], path: Path) -> No
     axes.set_xlim(min(rates) * 0.6, max(rates) * 6.0)
     axes.set_xlabel("steps per second; this package (blue): whole walking steps")
     axes.spines[["top", "right"]].set_visible(False)
-    axes.set_title(_caption(machine), fontsize=9, loc="left", color="dimgray")
-    save_figure(figure, path, dpi=160)
-
-
-def _caption(machine: Mapping[str, Any]) -> str:
     units = machine["vector_instructions"].upper().replace("AVX512F", "AVX-512")
-    return (
+    axes.set_title(
         f"{machine['processor']} ({machine['architecture']}, {units}, {machine['cores']} cores), one thread "
-        f"unless said, Python {machine['python']}"
+        f"unless said, Python {machine['python']}",
+        fontsize=9,
+        loc="left",
+        color="dimgray",
     )
+    save_figure(figure, path, dpi=160)
 
 
 def _short(speed: float) -> str:
@@ -189,11 +164,9 @@ def _short(speed: float) -> str:
 
 def main() -> None:
     """Run as a program."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--smallest", action="store_true", help="only to see that it runs")
-    parser.add_argument("--plot", type=Path, help="PNG file for the picture")
-    arguments = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument("--plot", type=Path, help="PNG file for the picture")
+    arguments = options.parse_args()
     speeds = compare(arguments.smallest)
     if arguments.plot:
         save_plot(speeds, machine(), arguments.plot)

@@ -6,6 +6,7 @@ moves them at every step, which the integrator has to follow: twice the work. Bo
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -13,8 +14,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector import VectorEnv
 
-from benchmarks.measure import FULL, SMALLEST, Effort, Timings, measure
-from benchmarks.measurements import Measurement, command_line
+from benchmarks.measure import FULL, SMALLEST, Effort, Measurement, command_line, measure
 from lean_yaw_env.envs.dynamics import OUTCOME_SIZE
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.kernel.batch import step_batch
@@ -26,14 +26,18 @@ SMALLEST_SIZES = (8,)
 CARTPOLES = 1024
 
 
+def _drawn(env: Any, actions: str, n: int) -> list[Any]:
+    """Random actions, or those of the fixed controller."""
+    env.action_space.seed(0)
+    env.reset(seed=0)
+    drawn = [env.action_space.sample() for _ in range(n)]
+    return [np.zeros_like(drawn[0])] * n if actions == "fixed" else drawn
+
+
 def single_steps(env_id: str, steps: int, actions: str) -> Callable[[], None]:
     """Steps of one unwrapped environment, begun anew where an episode ends."""
     env = gym.make(env_id).unwrapped
-    env.action_space.seed(0)
-    drawn = [env.action_space.sample() for _ in range(steps)]
-    if actions == "fixed":
-        drawn = [np.zeros_like(drawn[0])] * steps
-    env.reset(seed=0)
+    drawn = _drawn(env, actions, steps)
 
     def play() -> None:
         for action in drawn:
@@ -44,22 +48,10 @@ def single_steps(env_id: str, steps: int, actions: str) -> Callable[[], None]:
     return play
 
 
-def vector_steps(env: VectorEnv[Any, Any, Any], actions: str, steps: int = 1) -> Callable[[], None]:
-    """Steps of a vector environment."""
-    env.reset(seed=0)
-    env.action_space.seed(0)
-    drawn = [env.action_space.sample() for _ in range(4)]
-    if actions == "fixed":
-        drawn = [np.zeros_like(drawn[0])]
-    turn = 0
-
-    def play() -> None:
-        nonlocal turn
-        for _ in range(steps):
-            env.step(drawn[turn % len(drawn)])
-            turn += 1
-
-    return play
+def vector_steps(env: VectorEnv[Any, Any, Any], actions: str) -> Callable[[], object]:
+    """A step of a vector environment."""
+    drawn = itertools.cycle(_drawn(env, actions, 4))
+    return lambda: env.step(next(drawn))
 
 
 def walkers(n: int, **options: Any) -> WalkerVectorEnv:
@@ -82,30 +74,23 @@ def kernel_alone(env: WalkerVectorEnv) -> Callable[[], None]:
 
 
 def _single(effort: Effort, steps: int) -> list[Measurement]:
-    times = measure(
-        {
-            "heading": single_steps(HEADING, steps, "fixed"),
-            "random": single_steps(HEADING, steps, "random"),
-            "pendulum": single_steps("Pendulum-v1", steps, "random"),
-            "cartpole": single_steps("CartPole-v1", steps, "random"),
-        },
-        effort,
-        "single environments",
-    )
-    measured = [
-        Measurement(f"step_{case}", times.median(case) / steps * 1e6, "us", note=note)
-        for case, note in (
-            ("heading", "fixed controller"), ("random", "random actions"),
-            ("pendulum", "Pendulum-v1"), ("cartpole", "CartPole-v1"),
-        )
-    ]  # fmt: skip
-    over_pendulum = times.ratio("heading", "pendulum")
+    cases = {
+        "heading": (HEADING, "fixed", "fixed controller"),
+        "random": (HEADING, "random", "random actions"),
+        "pendulum": ("Pendulum-v1", "random", "Pendulum-v1"),
+        "cartpole": ("CartPole-v1", "random", "CartPole-v1"),
+    }
+    plays = {
+        name: single_steps(env_id, steps, actions) for name, (env_id, actions, _) in cases.items()
+    }
+    times = measure(plays, effort, "single environments")
     return [
-        *measured,
-        Measurement("step_over_pendulum", over_pendulum, "x", "<=", 1.0, "unwrapped"),
+        *(Measurement(f"step_{name}", times.median(name) / steps * 1e6, "us", note=note)
+          for name, (_, _, note) in cases.items()),
+        Measurement("step_over_pendulum", times.ratio("heading", "pendulum"), "x", "<=", 1.0, "unwrapped"),
         Measurement("random_step_over_pendulum", times.ratio("random", "pendulum"), "x"),
         Measurement("step_over_cartpole", times.ratio("heading", "cartpole"), "x", note="aim: 1"),
-    ]
+    ]  # fmt: skip
 
 
 def _vector(effort: Effort, n: int, actions: str) -> list[Measurement]:
@@ -120,48 +105,35 @@ def _vector(effort: Effort, n: int, actions: str) -> list[Measurement]:
     ]
 
 
-def _against_cartpole(effort: Effort, n: int) -> list[Measurement]:
-    cases: dict[str, Callable[[], object]] = {
-        actions: vector_steps(walkers(n), actions) for actions in ("fixed", "random")
-    }
-    cases["sync"] = vector_steps(
-        gym.make_vec("CartPole-v1", num_envs=n, vectorization_mode="sync"), "random"
+def _against_others(effort: Effort, n: int, largest: int) -> list[Measurement]:
+    """Against Gymnasium's vector of CartPoles, and two threads against one."""
+    sync = gym.make_vec("CartPole-v1", num_envs=n, vectorization_mode="sync")
+    times = measure(
+        {actions: vector_steps(walkers(n), actions) for actions in ("fixed", "random")}
+        | {"sync": vector_steps(sync, "random")},
+        effort,
+        "SyncVectorEnv",
     )
-    times = measure(cases, effort, "SyncVectorEnv")
-    return [
-        Measurement("sync_cartpole_steps_per_second", n / times.median("sync"), "1/s"),
-        Measurement(
-            "vector_over_sync_cartpole", times.ratio("sync", "fixed"), "x", ">=", 20.0, "fixed controller"
-        ),
-        Measurement(
-            "random_vector_over_sync_cartpole", times.ratio("sync", "random"), "x", ">=", 20.0,
-            "random actions",
-        ),
-    ]  # fmt: skip
-
-
-def _two_threads(effort: Effort, n: int) -> Timings:
-    return measure(
-        {str(t): vector_steps(walkers(n, threads=t), "fixed") for t in (1, 2)},
+    threads = measure(
+        {str(t): vector_steps(walkers(largest, threads=t), "fixed") for t in (1, 2)},
         effort,
         "two threads",
         threads=2,
     )
+    return [
+        Measurement("sync_cartpole_steps_per_second", n / times.median("sync"), "1/s"),
+        Measurement("vector_over_sync_cartpole", times.ratio("sync", "fixed"), "x", ">=", 20.0, "fixed controller"),
+        Measurement("random_vector_over_sync_cartpole", times.ratio("sync", "random"), "x", ">=", 20.0, "random actions"),
+        Measurement("vector_two_threads_over_one", threads.ratio("1", "2"), "x", ">=", 1.8),
+    ]  # fmt: skip
 
 
 def run(smallest: bool) -> list[Measurement]:
     """All measurements of the environments."""
     effort, sizes, steps = (SMALLEST, SMALLEST_SIZES, 5) if smallest else (FULL, SIZES, STEPS)
-    measured = _single(effort, steps)
-    for n in sizes:
-        for actions in ("fixed", "random"):
-            measured += _vector(effort, n, actions)
-    measured += _against_cartpole(effort, 8 if smallest else CARTPOLES)
-    threads = _two_threads(effort, sizes[-1])
-    return [
-        *measured,
-        Measurement("vector_two_threads_over_one", threads.ratio("1", "2"), "x", ">=", 1.8),
-    ]
+    vectors = [_vector(effort, n, actions) for n in sizes for actions in ("fixed", "random")]
+    others = _against_others(effort, 8 if smallest else CARTPOLES, sizes[-1])
+    return [*_single(effort, steps), *itertools.chain(*vectors), *others]
 
 
 if __name__ == "__main__":

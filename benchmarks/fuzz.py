@@ -26,16 +26,8 @@ WALKERS = 8192
 PITCH_PUSH, ANKLE_PUSH, GREATEST_LEVEL = 0.08, 0.15, 10.0
 # Springs and dampers may move an ankle this much faster than it walks; ``errors.SolverError`` says why no faster
 FASTEST_ANKLE = 300.0
-NAMES = {
-    records.STEPPED: "stepped",
-    records.BACKWARD: "backward",
-    records.SIDEWAYS: "sideways",
-    records.TRIP: "trip",
-    records.LIFT_OFF: "lift-off",
-    records.SLIP: "slip",
-    records.NO_STRIKE: "no heel strike",
-    records.FAILED: "FAILED",
-}
+_NAMES = ("stepped", "backward", "sideways", "trip", "lift_off", "slip", "no_strike", "FAILED")
+NAMES = {getattr(records, name.upper()): name.replace("_", " ") for name in _NAMES}
 _STATUS = Outcome._fields.index("status")
 _OFFSET = Outcome._fields.index("mass_offset")
 _GAIT = np.array([0.0, 0.155, -0.004, -0.415, -0.07])

@@ -22,12 +22,12 @@ from tqdm import tqdm
 
 from agents.evaluation.scoring import run_episodes
 from agents.learning.algorithms import settings_for, train
-from agents.learning.recorder import Arrays, read_checkpoint
+from agents.learning.recorder import State, read_checkpoint
 from agents.observations import ObservationLayout
 from agents.policies.policy import Policy, PolicyCard
 from agents.policies.policy_files import save, task_of
 from agents.registry import env_id_of
-from benchmarks.machine import machine
+from benchmarks.measure import machine
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.files import read_json, write_json
 from lean_yaw_env.rendering.figures import new_figure, save_figure
@@ -72,15 +72,15 @@ class Watch:
         self._began = time.process_time()
 
     def __call__(self, steps: int, recent_return: float) -> None:
-        """Told of the steps done and the return while exploring, which is not what is compared; the checkpoint may be of now or of the time before."""
+        """Look at the checkpoint, which may be of now or of the time before; the return while exploring is not what is compared."""
         now = time.process_time()
         self._clock[steps] = now - self._began - self._paused
         if self._file.exists():
-            arrays = read_checkpoint(self._file)
-            done = int(arrays["count.steps"])
+            state = read_checkpoint(self._file)
+            done = int(state["steps"])
             last = self._curve.steps[-1] if self._curve.steps else 0
             if done in self._clock and done >= last + self._every:
-                self.note(done, self._clock[done], policy_in(self._env_id, self._algorithm, arrays))
+                self.note(done, self._clock[done], policy_in(self._env_id, self._algorithm, state))
         self._paused += time.process_time() - now
 
     def finish(self, steps: int, policy: Policy) -> None:
@@ -88,24 +88,24 @@ class Watch:
         self.note(steps, time.process_time() - self._began - self._paused, policy)
 
     def note(self, steps: int, seconds: float, policy: Policy) -> None:
-        """Judge a policy, and write down what it comes to."""
+        """Evaluate a policy, and write down its return."""
         episodes = run_episodes(policy, task_of(self._env_id), episodes=EPISODES)
         self._curve.steps.append(steps)
         self._curve.seconds.append(round(seconds, 2))
         self._curve.returns.append(round(float(episodes.metrics["return"].mean()), 3))
 
 
-def policy_in(env_id: str, algorithm: str, arrays: Arrays) -> Policy:
+def policy_in(env_id: str, algorithm: str, state: State) -> Policy:
     """The policy within a training's checkpoint."""
     layout = ObservationLayout.of(task_of(env_id), EnvOptions())
     if algorithm == "ppo":
-        names = ["policy.mlp_extractor.policy_net.0", "policy.mlp_extractor.policy_net.2", "policy.action_net"]  # fmt: skip
-        mean, variance = arrays["observations.mean"], arrays["observations.var"]
+        names = ["mlp_extractor.policy_net.0", "mlp_extractor.policy_net.2", "action_net"]
+        mean, variance = state["observations"]["mean"], state["observations"]["var"]
     else:
-        names = ["policy.0", "policy.2", "policy.4"]
+        names = ["0", "2", "4"]
         mean, variance = np.zeros(len(layout.names)), np.ones(len(layout.names))
     weights = {
-        f"layers.{k}.{part}": arrays[f"{name}.{part}"]
+        f"layers.{k}.{part}": state["policy"][f"{name}.{part}"]
         for k, name in enumerate(names)
         for part in ("weight", "bias")
     }
@@ -183,12 +183,11 @@ def save_comparison(curves: list[Curve], task: str, machine: Mapping[str, Any], 
                 label = f"{name}, median of {len(own)}" if len(own) > 1 else f"{name}, one training"  # fmt: skip
                 axes.plot(*_median(own, cost), color=colour, linewidth=2.2, label=label)
         axes.set_xscale("log")
+        axes.xaxis.set_major_formatter(EngFormatter(sep=""))
         axes.grid(color="0.9", which="both")
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
-    panels[0].xaxis.set_major_formatter(EngFormatter(sep=""))
     panels[0].set_xlabel("walking steps trained (k: thousands, M: millions)")
-    panels[1].xaxis.set_major_formatter(EngFormatter(sep=""))
     panels[1].set_xlabel("processor seconds of one core")
     panels[0].set_ylabel("return of a held-out episode")
     panels[0].legend(loc="lower right", frameon=False)
@@ -207,22 +206,17 @@ def _median(curves: list[Curve], cost: str) -> tuple[Any, Any]:
     return grid, np.median(values, axis=0)
 
 
+_Steps = Annotated[int | None, typer.Option(help="Steps of each, in place of the task's.")]
+
+
 def main(
     task: Annotated[str, typer.Option(help="The task's name.")] = "Heading",
     apg: Annotated[int, typer.Option(help="Trainings of the gradient agent.")] = 5,
     ppo: Annotated[int, typer.Option(help="Trainings of PPO.")] = 5,
-    apg_steps: Annotated[
-        int | None, typer.Option(help="Steps of each, in place of the task's.")
-    ] = None,
-    ppo_steps: Annotated[
-        int | None, typer.Option(help="Steps of each, in place of the task's.")
-    ] = None,
-    level: Annotated[
-        list[float] | None, typer.Option(help="Returns whose reaching is compared.")
-    ] = None,
-    keep: Annotated[
-        Path | None, typer.Option(help="Folder for the trained policies; none otherwise.")
-    ] = None,
+    apg_steps: _Steps = None,
+    ppo_steps: _Steps = None,
+    level: Annotated[list[float] | None, typer.Option(help="Returns to compare.")] = None,
+    keep: Annotated[Path | None, typer.Option(help="Folder to keep the policies in.")] = None,
 ) -> None:
     """Train both algorithms on a task and compare how soon they come to the same score."""
     env_id = env_id_of(task)

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 import lean_yaw_env
-from benchmarks.measurements import Measurement, command_line
+from benchmarks.measure import Measurement, command_line
 
 PROGRAM = """
 import time

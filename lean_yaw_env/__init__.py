@@ -18,21 +18,13 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_HOMES = {
-    "EnergyLedger": "lean_yaw_env.walker",
-    "Fall": "lean_yaw_env.walker",
-    "FellError": "lean_yaw_env.errors",
-    "LeanYawError": "lean_yaw_env.errors",
-    "LimitCycle": "lean_yaw_env.analysis",
-    "NoGaitError": "lean_yaw_env.errors",
-    "STATE_FIELDS": "lean_yaw_env.parameters",
-    "SolverError": "lean_yaw_env.errors",
-    "StepResult": "lean_yaw_env.walker",
-    "Walk": "lean_yaw_env.walker",
-    "Walker": "lean_yaw_env.walker",
-    "WalkerParameters": "lean_yaw_env.parameters",
-    "find_limit_cycle": "lean_yaw_env.analysis",
+_EXPORTS = {
+    "analysis": ("LimitCycle", "find_limit_cycle"),
+    "errors": ("FellError", "LeanYawError", "NoGaitError", "SolverError"),
+    "parameters": ("STATE_FIELDS", "WalkerParameters"),
+    "walker": ("EnergyLedger", "Fall", "StepResult", "Walk", "Walker"),
 }
+"""Names by the module that defines them."""
 
 __all__ = [
     "STATE_FIELDS",
@@ -53,13 +45,14 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(_HOMES[name]), name)
+    for module, names in _EXPORTS.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted(set(globals()) | set(_HOMES))
+    return sorted(set(globals()) | set(__all__))
 
 
 register_envs()

@@ -16,8 +16,8 @@ import numpy as np
 
 from lean_yaw_env.analysis import section_map_of
 from lean_yaw_env.batch import step_batch
+from lean_yaw_env.envs.derivatives import LinearisedSteps
 from lean_yaw_env.envs.goal_env import WaypointGoalEnv
-from lean_yaw_env.envs.linearised import LinearisedSteps
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.kernel.compilation import for_types_of
 from lean_yaw_env.kernel.jacobian import careful_derivatives
@@ -25,12 +25,13 @@ from lean_yaw_env.kernel.step import careful_step
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.passive import PassiveWalker
 from lean_yaw_env.registration import TASK_VERSIONS
+from lean_yaw_env.reporting import keep, reporting
 from lean_yaw_env.validation import require_choice
 from lean_yaw_env.walker import Walker
 
 Work = tuple[str, Callable[[], object]]
 _STATE = np.array([0.0, 0.155, 0.0, -0.42, 0.0])
-_PASSIVE_STATE = np.array([0.0, 0.2, 0.0, -0.2, 0.0, -0.005])
+_PASSIVE = np.array([0.0, 0.2, 0.0, -0.2, 0.0, -0.005])
 
 
 def all_work(tasks: Sequence[str] = tuple(TASK_VERSIONS)) -> Iterator[Work]:
@@ -50,12 +51,9 @@ def all_work(tasks: Sequence[str] = tuple(TASK_VERSIONS)) -> Iterator[Work]:
     yield "steps of a batch", lambda: step_batch(walker.parameters, _STATE[None], [1.0])
     yield "derivatives of a step", lambda: closed.linear_step(_STATE, 0, None)
     yield "derivatives by the body", lambda: closed.linear_step(_STATE, 0, "slope")
-    yield "passive step", lambda: passive.step(_PASSIVE_STATE)
-    yield "passive motion", lambda: passive.motion(_PASSIVE_STATE, duration=0.1)
-    yield (
-        "passive derivatives",
-        lambda: section_map_of(passive).linear_step(_PASSIVE_STATE, 0, None),
-    )
+    yield "passive step", lambda: passive.step(_PASSIVE)
+    yield "passive motion", lambda: passive.motion(_PASSIVE, duration=0.1)
+    yield "passive derivatives", lambda: section_map_of(passive).linear_step(_PASSIVE, 0, None)
     yield "goals", lambda: WaypointGoalEnv().reset(seed=0)
     for task in tasks:
         yield f"task {task}", partial(_use, task)
@@ -75,9 +73,9 @@ def _use(task: str) -> None:
 
 
 def compile_all(
-    tasks: Sequence[str] = tuple(TASK_VERSIONS), say: Callable[[str], object] = print
+    tasks: Sequence[str] = tuple(TASK_VERSIONS), report: Callable[[str], object] = print
 ) -> None:
-    """Compile everything, or what these tasks need, and say what takes how long.
+    """Compile everything, or what these tasks need, and report how long each part takes.
 
     Raises
     ------
@@ -90,8 +88,8 @@ def compile_all(
     for name, work in all_work(tasks):
         start = time.perf_counter()
         work()
-        say(f"{name:<25}{time.perf_counter() - start:6.1f} s")
-    say(f"{'all':<25}{time.perf_counter() - begin:6.1f} s")
+        report(f"{name:<25}{time.perf_counter() - start:6.1f} s")
+    report(f"{'all':<25}{time.perf_counter() - begin:6.1f} s")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -99,10 +97,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m lean_yaw_env.compile", description=__doc__)
     parser.add_argument("tasks", nargs="*", metavar="TASK", help="tasks' names; all by default")
     given = parser.parse_args(arguments)
-    try:
+    with reporting("compile"):
+        keep("what is compiled is kept; run the same command again to compile the rest")
         compile_all(given.tasks or tuple(TASK_VERSIONS), lambda line: print(line, flush=True))
-    except ValueError as error:
-        parser.error(str(error))
 
 
 if __name__ == "__main__":

@@ -153,16 +153,9 @@ class WalkerParameters:
 
     def body(self) -> Body:
         """The same parameters as the kernels take them."""
+        numbers = (getattr(self, limits.name) for limits in PARAMETER_RANGES)
         return Body(
-            hip_width=self.hip_width,
-            foot_radius=self.foot_radius,
-            ankle_tilt=self.ankle_tilt,
-            slope=self.slope,
-            ankle_stiffness=self.ankle_stiffness,
-            ankle_damping=self.ankle_damping,
-            shift_time=self.shift_time,
-            friction_limit=self.friction_limit,
-            max_step_duration=self.max_step_duration,
+            *numbers,
             slope_turns=1.0 if self.slope_turns else 0.0,
             strike_at_start=1.0 if self.early_contact == "strike" else 0.0,
         )

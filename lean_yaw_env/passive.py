@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import Enum
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,8 +21,24 @@ from lean_yaw_env.parameters import (
     require_foot,
     require_state,
 )
-from lean_yaw_env.validation import require_count, require_flag, require_number, require_shape
-from lean_yaw_env.walker import OTHER_FOOT, SIDE, raise_for_failure
+from lean_yaw_env.validation import (
+    require_count,
+    require_flag,
+    require_instance,
+    require_number,
+    require_shape,
+)
+from lean_yaw_env.walker import (
+    FALL_OF_STATUS,
+    OTHER_FOOT,
+    SIDE,
+    BaseWalk,
+    EnergyLedger,
+    Fall,
+    StepResult,
+    raise_for_failure,
+    walk_arrays,
+)
 
 PASSIVE_STATE_FIELDS = (
     *STATE_FIELDS,
@@ -55,96 +70,21 @@ MOTION_COLUMNS = (
 """What ``PassiveWalker.motion`` gives; the height is the swing foot's above touching the floor."""
 
 
-class PassiveFall(str, Enum):
-    """The ways a passive walker falls, each by a physical criterion; members equal their names."""
-
-    BACKWARD = "backward"
-    """The stance leg moves backward and accelerates backward: it does not pass mid-stance."""
-    FORWARD = "forward"
-    """The leg tips over forward, the swing foot not down, until it is level or the floor no longer holds it."""
-    SIDEWAYS = "sideways"
-    """An ankle would turn past a right angle, foot and ankle no longer move the masses apart, or the walker goes down past mid-stance, not forward."""
-    LIFT_OFF = "lift-off"
-    """The normal force vanishes before mid-stance: the walker is too fast for its weight."""
-    SLIP = "slip"
-    """The step demands more friction than ``friction_limit``."""
-    NO_HEEL_STRIKE = "no-heel-strike"
-    """The swing foot does not come down in front within ``max_step_duration``."""
-
-
-_FALL_OF_STATUS = {
-    records.BACKWARD: PassiveFall.BACKWARD,
-    records.SIDEWAYS: PassiveFall.SIDEWAYS,
-    records.SLIP: PassiveFall.SLIP,
-    records.NO_STRIKE: PassiveFall.NO_HEEL_STRIKE,
-}
-
-
 @dataclass(frozen=True)
-class PassiveStep:
-    """One passive step.
+class PassiveStep(StepResult):
+    """One passive step; no mass is moved."""
 
-    Attributes
-    ----------
-    state : shape (6,)
-        Section state just after the heel strike, or where the walker was when it fell.
-    stance : "left" or "right"
-        The foot that stands in ``state``.
-    inter_leg_angle : float
-        Of ``state``, rad: negative, the new swing leg trails.
-    start_inter_leg_angle : float
-        At the start of the step, rad.
-    duration, heading_change : float
-    displacement : shape (2,)
-        Between contact reference points: downhill (x) and to the right (z), leg lengths.
-    fall : PassiveFall or None
-    least_normal_force, greatest_friction : float
-        Least normal force (in weights) and greatest tangential over normal force.
-    gravity_work, impact_loss, ankle_loss : float
-        Energy given by gravity, lost at heel strike and in the ankle, in weight times leg length.
-    """
-
-    state: Vector
-    stance: Foot
     inter_leg_angle: float
+    """Of ``state``, rad: negative, the new swing leg trails."""
     start_inter_leg_angle: float
-    duration: float
-    displacement: Vector
-    heading_change: float
-    fall: PassiveFall | None
-    least_normal_force: float
-    greatest_friction: float
-    gravity_work: float
-    impact_loss: float
-    ankle_loss: float
+    """At the start of the step, rad."""
 
 
 @dataclass(frozen=True)
-class PassiveWalk:
-    """A sequence of ``n`` completed passive steps.
+class PassiveWalk(BaseWalk):
+    """A walk of a passive walker; ``inter_leg_angles`` has shape (n + 1,)."""
 
-    Attributes
-    ----------
-    states : shape (n + 1, 6)
-    stances : n + 1 feet
-    inter_leg_angles : shape (n + 1,)
-    footprints : shape (n + 1, 2)
-        Contact reference points, (downhill, right), the first at the origin.
-    durations : shape (n,)
-    fall : PassiveFall or None
-        How the walk ended, if not by its number of steps.
-    """
-
-    states: Vector
-    stances: tuple[Foot, ...]
     inter_leg_angles: Vector
-    footprints: Vector
-    durations: Vector
-    fall: PassiveFall | None
-
-    @property
-    def n_steps(self) -> int:
-        return len(self.durations)
 
 
 @dataclass(frozen=True)
@@ -165,8 +105,7 @@ class PassiveWalker:
     planar: bool = False
 
     def __post_init__(self) -> None:
-        if not isinstance(self.parameters, WalkerParameters):
-            raise ValueError(f"parameters must be WalkerParameters, got {self.parameters!r}")
+        require_instance("parameters", self.parameters, WalkerParameters)
         require_flag("planar", self.planar)
 
     @property
@@ -206,7 +145,27 @@ class PassiveWalker:
         raise_for_failure(
             outcome.status, self.moving_parameters.body(), (angle,), start, SIDE[foot]
         )
-        return _result(outcome, foot, start)
+        if outcome.status == records.TRIP:
+            raise ValueError(
+                f"state {start.tolist()} has no trailing swing foot on the floor: its stance_pitch "
+                "must be positive and its lean within what the swing leg reaches"
+            )
+        fall = fall_of(outcome.status, outcome.stance_pitch)
+        return PassiveStep(
+            state=np.array(outcome[:PASSIVE_STATE_SIZE]),
+            stance=foot if fall else OTHER_FOOT[foot],
+            duration=outcome.duration,
+            displacement=np.array([outcome.displacement_x, outcome.displacement_z]),
+            heading_change=outcome.heading_change,
+            mass_offset=0.0,
+            fall=fall,
+            least_normal_force=outcome.least_normal_force,
+            greatest_friction=outcome.greatest_friction,
+            energy=EnergyLedger(outcome.gravity_work, 0.0, outcome.impact_loss, outcome.ankle_loss),
+            evaluations=int(outcome.evaluations),
+            inter_leg_angle=outcome.inter_leg_angle,
+            start_inter_leg_angle=outcome.start_inter_leg_angle,
+        )
 
     def walk(self, n_steps: int, *, state: ArrayLike, stance: Foot = "left") -> PassiveWalk:
         """Walk ``n_steps`` steps, or until a fall, from both feet on the floor.
@@ -217,31 +176,19 @@ class PassiveWalker:
             As ``step``.
         """
         n_steps = require_count("n_steps", n_steps)
-        result = None
-        current, foot = require_passive_state(state, planar=self.planar), require_foot(stance)
-        states, angles, footprints, durations = [current], [], [np.zeros(2)], []
-        stances: list[Foot] = [foot]
-        angle: float | None = None
+        start, first = require_passive_state(state, planar=self.planar), require_foot(stance)
+        results: list[PassiveStep] = []
+        current, foot, angle = start, first, None
         for _ in range(n_steps):
             result = self.step(current, stance=foot, inter_leg_angle=angle)
-            angles.append(result.start_inter_leg_angle)
+            results.append(result)
             if result.fall is not None:
                 break
             current, foot, angle = result.state, result.stance, result.inter_leg_angle
-            states.append(current)
-            stances.append(foot)
-            footprints.append(footprints[-1] + result.displacement)
-            durations.append(result.duration)
-        if len(angles) < len(states):
-            angles.append(angle)
-        return PassiveWalk(
-            states=np.array(states),
-            stances=tuple(stances),
-            inter_leg_angles=np.array(angles),
-            footprints=np.array(footprints),
-            durations=np.array(durations),
-            fall=None if result is None else result.fall,
-        )
+        angles = [result.start_inter_leg_angle for result in results]
+        if results[-1].fall is None:
+            angles.append(results[-1].inter_leg_angle)
+        return PassiveWalk(**walk_arrays(start, first, results), inter_leg_angles=np.array(angles))
 
     def motion(
         self,
@@ -330,32 +277,8 @@ def step_passive_rows(
     return results
 
 
-def fall_of(status: float, stance_pitch: float) -> PassiveFall | None:
-    """The way a step ended, or None if it was completed."""
-    if status == records.LIFT_OFF:
-        return PassiveFall.FORWARD if stance_pitch < 0.0 else PassiveFall.LIFT_OFF
-    return _FALL_OF_STATUS.get(status)
-
-
-def _result(outcome: PassiveOutcome, foot: Foot, start: Vector) -> PassiveStep:
-    if outcome.status == records.TRIP:
-        raise ValueError(
-            f"state {start.tolist()} has no trailing swing foot on the floor: its stance_pitch "
-            "must be positive and its lean within what the swing leg reaches"
-        )
-    fall = fall_of(outcome.status, outcome.stance_pitch)
-    return PassiveStep(
-        state=np.array(outcome[:PASSIVE_STATE_SIZE]),
-        stance=foot if fall else OTHER_FOOT[foot],
-        inter_leg_angle=outcome.inter_leg_angle,
-        start_inter_leg_angle=outcome.start_inter_leg_angle,
-        duration=outcome.duration,
-        displacement=np.array([outcome.displacement_x, outcome.displacement_z]),
-        heading_change=outcome.heading_change,
-        fall=fall,
-        least_normal_force=outcome.least_normal_force,
-        greatest_friction=outcome.greatest_friction,
-        gravity_work=outcome.gravity_work,
-        impact_loss=outcome.impact_loss,
-        ankle_loss=outcome.ankle_loss,
-    )
+def fall_of(status: float, stance_pitch: float) -> Fall | None:
+    """The way a passive step ended, or None if it was completed."""
+    if status == records.LIFT_OFF and stance_pitch < 0.0:
+        return Fall.FORWARD
+    return None if status == records.TRIP else FALL_OF_STATUS.get(status)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from gymnasium.envs.registration import register, registry
+from gymnasium.envs.registration import parse_env_id, register, registry
+from gymnasium.error import Error
+
+from lean_yaw_env.validation import require_finite
 
 NAMESPACE = "LeanYaw"
 
@@ -16,7 +19,7 @@ TASK_VERSIONS = {
     "UTurn": 0,
     "Level": 0,
 }
-"""Every task's name and version; the module of the same name in ``envs.tasks`` defines it."""
+"""Every task's name and version; ``envs.tasks`` defines the tasks."""
 
 REWARD_THRESHOLDS = {
     "Heading": 184.0,
@@ -27,12 +30,12 @@ REWARD_THRESHOLDS = {
     "Level": 179.0,
 }
 """The mean return from which a task counts as solved: what the best feedback controller earns on held-out episodes (docs/leaderboard.md).
-Other tasks are not judged by their return."""
+Other tasks are measured otherwise."""
 
 ENV_IDS = tuple(f"{NAMESPACE}/{name}-v{version}" for name, version in TASK_VERSIONS.items())
 
 GOAL_TASK = "WaypointGoal"
-"""Waypoint with one goal, paid for reaching it alone."""
+"""Waypoint with one goal, rewarded for reaching it alone."""
 GOAL_ENV_ID = f"{NAMESPACE}/{GOAL_TASK}-v0"
 """That task for goal-conditioned learners: the one environment whose observations are dictionaries."""
 
@@ -49,25 +52,30 @@ def name_of_task(task: str) -> str:
 
 
 def register_id(env_id: str, task: str, *, reward_threshold: float | None = None) -> None:
-    """Register an id for a task, unless it is registered already."""
+    """Register an id for a task, unless it is registered already.
+
+    Raises
+    ------
+    ValueError
+        If ``env_id`` is not of the form "Namespace/Name-v0", or the threshold is not a number.
+    """
+    try:
+        parse_env_id(env_id)
+    except (TypeError, Error) as error:
+        raise ValueError(f"env_id must be like 'Mine/Zigzag-v0', got {env_id!r}") from error
+    if reward_threshold is not None:
+        require_finite("reward_threshold", reward_threshold)
     TASK_IDS[env_id] = task
     if env_id not in registry:
         register(
             id=env_id,
-            entry_point=f"lean_yaw_env.envs.made:{task}",
-            vector_entry_point=f"lean_yaw_env.envs.made:{task}Vector",
+            entry_point=f"lean_yaw_env.envs.entry_points:{task}",
+            vector_entry_point=f"lean_yaw_env.envs.entry_points:{task}Vector",
             reward_threshold=reward_threshold,
         )
 
 
 def register_envs() -> None:
     """Register every environment that is not registered yet; calling it again does nothing."""
-    for name, env_id in zip(TASK_VERSIONS, ENV_IDS, strict=True):
+    for name, env_id in zip(ALL_TASKS, ALL_ENV_IDS, strict=True):
         register_id(env_id, name, reward_threshold=REWARD_THRESHOLDS.get(name))
-    TASK_IDS[GOAL_ENV_ID] = GOAL_TASK
-    if GOAL_ENV_ID not in registry:
-        register(
-            id=GOAL_ENV_ID,
-            entry_point="lean_yaw_env.envs.goal_env:WaypointGoalEnv",
-            vector_entry_point="lean_yaw_env.envs.goal_env:WaypointGoalVectorEnv",
-        )

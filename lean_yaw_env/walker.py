@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from enum import Enum
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.errors import FellError, SolverError
-from lean_yaw_env.files import require_ending, write_json
+from lean_yaw_env.files import json_text, require_ending, write_json
 from lean_yaw_env.kernel import records
 from lean_yaw_env.kernel.records import Body, Command, Outcome
 from lean_yaw_env.kernel.step import step as step_kernel
 from lean_yaw_env.kernel.trace import COLUMNS, trace
 from lean_yaw_env.parameters import (
     INTER_LEG_ANGLE,
+    STATE_SIZE,
     Foot,
     Vector,
     WalkerParameters,
@@ -28,7 +29,15 @@ from lean_yaw_env.parameters import (
     require_mass_offset,
     require_state,
 )
-from lean_yaw_env.validation import require_count, require_number, require_one_or_each
+from lean_yaw_env.validation import (
+    require_count,
+    require_instance,
+    require_number,
+    require_one_or_each,
+)
+
+if TYPE_CHECKING:
+    from lean_yaw_env.viewer import PageDisplay
 
 SIDE: dict[Foot, float] = {"left": 1.0, "right": -1.0}
 OTHER_FOOT: dict[Foot, Foot] = {"left": "right", "right": "left"}
@@ -38,7 +47,10 @@ class Fall(str, Enum):
     """The ways to fall, each by a physical criterion; members compare equal to their names."""
 
     BACKWARD = "backward"
-    """The stance leg moves backward, faster than 0.1 rad per unit of time, and speeds up: it does not pass mid-stance."""
+    """The stance leg moves backward, faster than 0.1 rad per unit of time (a passive walker's at any rate), and speeds up: it does not
+    pass mid-stance."""
+    FORWARD = "forward"
+    """Of passive walkers: the leg tips over forward, the swing foot not down, until it is level or the floor no longer holds it."""
     SIDEWAYS = "sideways"
     """An ankle, of the stance foot or of the swing foot to be laid flat, would have to turn past a right angle, or the walker
     comes down on its swing foot without moving forward onto it, or (next to no hip width) foot and ankle come to move the masses
@@ -81,78 +93,44 @@ class EnergyLedger(NamedTuple):
 
 @dataclass(frozen=True)
 class StepResult:
-    """One walking step.
-
-    Attributes
-    ----------
-    state : shape (5,)
-        Section state just after the heel strike, or where the walker was when it fell.
-    stance : "left" or "right"
-        The foot that stands in ``state``.
-    duration : float
-        From heel strike to heel strike, in units of sqrt(leg length / gravity).
-    displacement : shape (2,)
-        From the old to the new contact reference point: downhill (x) and to the right of someone facing downhill (z).
-    heading_change : float
-        Of the stance foot's heading, rad, positive to the left.
-    mass_offset : float
-        Offset in force at the end; a heel strike in mid-shift locks the masses where they are.
-    fall : Fall or None
-    least_normal_force, greatest_friction : float
-        Least normal force (in weights) and greatest ratio of tangential to normal force, among the instants at which the integrator looked.
-    energy : EnergyLedger
-    evaluations : int
-        How often the equations of motion were evaluated.
-    """
+    """One walking step."""
 
     state: Vector
+    """Section state (5,), or (6,) of a passive walker, just after the heel strike, or where the walker was when it fell."""
     stance: Foot
+    """The foot that stands in ``state``."""
     duration: float
+    """From heel strike to heel strike, in units of sqrt(leg length / gravity)."""
     displacement: Vector
+    """From the old to the new contact reference point (2,): downhill (x) and to the right of someone facing downhill (z)."""
     heading_change: float
+    """Of the stance foot's heading, rad, positive to the left."""
     mass_offset: float
+    """Offset in force at the end; a heel strike in mid-shift locks the masses where they are."""
     fall: Fall | None
     least_normal_force: float
+    """In weights, among the instants at which the integrator looked."""
     greatest_friction: float
+    """Greatest ratio of tangential to normal force among the same instants."""
     energy: EnergyLedger
     evaluations: int
+    """How often the equations of motion were evaluated."""
 
 
 @dataclass(frozen=True)
-class Walk:
-    """A sequence of walking steps; ``n`` of them were completed.
-
-    Attributes
-    ----------
-    states : shape (n + 1, 5)
-        Section states, the first being the start.
-    stances : n + 1 feet
-    footprints : shape (n + 1, 2)
-        Contact reference points on the floor, (downhill, right), the first at the origin.
-    durations : shape (n,)
-    mass_offsets : shape (n + 1,)
-        Offsets in force at each heel strike.
-    commands : shape (m, 2)
-        Inter-leg angle and mass offset commanded for each step begun: ``n``, or one more after a fall.
-    energies : n ledgers
-    path : shape (m, 4)
-        Time, and the centre of mass downhill, up and right, sampled within the steps; empty unless asked for.
-    fall : Fall or None
-        How the walk ended, if not by its number of steps.
-    parameters : WalkerParameters
-        Of the walker.
-    """
+class BaseWalk:
+    """A sequence of walking steps; ``n`` of them were completed."""
 
     states: Vector
+    """Section states (n + 1, 5), or (n + 1, 6) of a passive walker, the first being the start."""
     stances: tuple[Foot, ...]
+    """n + 1 feet."""
     footprints: Vector
+    """Contact reference points on the floor (n + 1, 2): downhill, right, the first at the origin."""
     durations: Vector
-    mass_offsets: Vector
-    commands: Vector
-    energies: tuple[EnergyLedger, ...]
-    path: Vector
+    """Of the steps, shape (n,)."""
     fall: Fall | None
-    parameters: WalkerParameters
+    """How the walk ended, if not by its number of steps."""
 
     @property
     def headings(self) -> Vector:
@@ -168,6 +146,22 @@ class Walk:
         """Straight-line distance between the first and the last footprint, in leg lengths."""
         return float(np.linalg.norm(self.footprints[-1] - self.footprints[0]))
 
+
+@dataclass(frozen=True)
+class Walk(BaseWalk):
+    """A walk of the active walker."""
+
+    mass_offsets: Vector
+    """Offsets in force at each heel strike, shape (n + 1,)."""
+    commands: Vector
+    """Inter-leg angle and mass offset commanded for each step begun, shape (m, 2): m is ``n``, or one more after a fall."""
+    energies: tuple[EnergyLedger, ...]
+    """n ledgers."""
+    path: Vector
+    """Time, and the centre of mass downhill, up and right, sampled within the steps, shape (k, 4); empty unless asked for."""
+    parameters: WalkerParameters
+    """Of the walker."""
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the walk to a .json file that the web page opens: ``lean-yaw view --walk FILE``.
 
@@ -178,8 +172,16 @@ class Walk:
         ValueError
             If the path has another ending, or its folder does not exist.
         """
-        place = require_ending(path, (".json",))
-        saved = {
+        write_json(require_ending(path, (".json",)), self._saved())
+
+    def show(self, height: int = 620) -> PageDisplay:
+        """The walk on the web page, for a notebook, which shows what a cell's last line returns; ``height`` is in pixels."""
+        from lean_yaw_env.viewer.notebook import PageDisplay  # few programs need it
+
+        return PageDisplay(json_text(self._saved()), height)
+
+    def _saved(self) -> dict[str, Any]:
+        return {
             "format": "lean-yaw-walk",
             "version": 1,
             "parameters": asdict(self.parameters),
@@ -189,7 +191,6 @@ class Walk:
             "commanded_offsets": self.commands[:, 1].tolist(),
             "mass_offsets": self.mass_offsets.tolist(),
         }
-        write_json(place, saved)
 
 
 @dataclass(frozen=True)
@@ -199,8 +200,7 @@ class Walker:
     parameters: WalkerParameters = field(default_factory=WalkerParameters)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.parameters, WalkerParameters):
-            raise ValueError(f"parameters must be WalkerParameters, got {self.parameters!r}")
+        require_instance("parameters", self.parameters, WalkerParameters)
 
     def step(
         self,
@@ -232,10 +232,8 @@ class Walker:
         SolverError
             If the integrator fails; never for a fall, which is a result.
         """
-        start = require_state(state)
-        foot = require_foot(stance)
         command = require_command(inter_leg_angle, mass_offset, previous_offset)
-        return self._step(start, foot, command)
+        return self._step(require_state(state), require_foot(stance), command)
 
     def walk(
         self,
@@ -270,46 +268,38 @@ class Walker:
         samples = require_count("samples_per_step", samples_per_step, 0, 10_000)
         if samples == 1:
             raise ValueError("samples_per_step must be 0 or from 2 to 10000, got 1")
-        foot = require_foot(stance)
-        current = require_state(state)
+        start, first = require_state(state), require_foot(stance)
         angles = require_one_or_each("inter_leg_angle", inter_leg_angle, n_steps).tolist()
         offsets = require_one_or_each("mass_offset", mass_offset, n_steps).tolist()
         commands = [require_command(a, m, None) for a, m in zip(angles, offsets, strict=True)]
-        before = require_command(angles[0], offsets[0], previous_offset).previous_offset
-
-        states, footprints = [current], [np.zeros(2)]
-        stances: list[Foot] = [foot]
-        durations: list[float] = []
-        in_force, energies, path = [before], [], []
-        fall = None
-        for command in commands:
-            moved = command._replace(previous_offset=in_force[-1])
-            result = self._step(current, foot, moved)
-            if samples:
-                rows = self._trace(current, foot, moved, result.duration, samples)
-                path.append(_centre_path(rows, current[0], footprints[-1], sum(durations)))
-            if result.fall is not None:
-                fall = result.fall
+        in_force = [require_command(angles[0], offsets[0], previous_offset).previous_offset]
+        results: list[StepResult] = []
+        current, foot = start, first
+        for k in range(n_steps):
+            commands[k] = commands[k]._replace(previous_offset=in_force[-1])
+            results.append(self._step(current, foot, commands[k]))
+            if results[-1].fall is not None:
                 break
-            current, foot = result.state, result.stance
-            states.append(current)
-            stances.append(foot)
-            footprints.append(footprints[-1] + result.displacement)
-            durations.append(result.duration)
-            in_force.append(result.mass_offset)
-            energies.append(result.energy)
-        return Walk(
-            states=np.array(states),
-            stances=tuple(stances),
-            footprints=np.array(footprints),
-            durations=np.array(durations),
+            current, foot = results[-1].state, results[-1].stance
+            in_force.append(results[-1].mass_offset)
+        begun = commands[: len(results)]
+        walk = Walk(
+            **walk_arrays(start, first, results),
             mass_offsets=np.array(in_force),
-            commands=np.array(commands[: len(durations) + (fall is not None)])[:, :2],
-            energies=tuple(energies),
-            path=np.concatenate(path) if path else np.empty((0, 4)),
-            fall=fall,
+            commands=np.array(begun)[:, :2],
+            energies=tuple(result.energy for result in results if result.fall is None),
+            path=np.empty((0, 4)),
             parameters=self.parameters,
         )
+        if not samples:
+            return walk
+        times = np.cumsum([0.0, *walk.durations])
+        starts = zip(walk.states, walk.stances, walk.footprints, times, strict=True)
+        paths = [
+            _centre_path(self._trace(state, foot, command, result.duration, samples), state[0], *at)
+            for (state, foot, *at), command, result in zip(starts, begun, results, strict=False)
+        ]
+        return replace(walk, path=np.concatenate(paths))
 
     def stance_motion(
         self,
@@ -356,8 +346,24 @@ class Walker:
         row = np.empty(len(Outcome._fields))
         step_kernel(self._body, np.array(command), state, SIDE[foot], row)
         outcome = Outcome._make(row.tolist())
-        raise_for_failure(outcome.status, self.parameters.body(), command, state, SIDE[foot])
-        return _result(outcome, foot)
+        if outcome.status == records.FAILED:
+            raise failure_of(self.parameters.body(), command, state, SIDE[foot])
+        fall = FALL_OF_STATUS.get(outcome.status)
+        return StepResult(
+            state=np.array(outcome[:STATE_SIZE]),
+            stance=foot if fall else OTHER_FOOT[foot],
+            duration=outcome.duration,
+            displacement=np.array([outcome.displacement_x, outcome.displacement_z]),
+            heading_change=outcome.heading_change,
+            mass_offset=outcome.mass_offset,
+            fall=fall,
+            least_normal_force=outcome.least_normal_force,
+            greatest_friction=outcome.greatest_friction,
+            energy=EnergyLedger(
+                outcome.gravity_work, outcome.shift_work, outcome.impact_loss, outcome.ankle_loss
+            ),
+            evaluations=int(outcome.evaluations),
+        )
 
     def _trace(
         self, state: Vector, stance: Foot, command: Command, duration: float, samples: int
@@ -411,34 +417,22 @@ def failure_of(
     )
 
 
-def _result(outcome: Outcome, foot: Foot) -> StepResult:
-    fall = FALL_OF_STATUS.get(outcome.status)
-    return StepResult(
-        state=np.array(outcome[:5]),
-        stance=foot if fall else OTHER_FOOT[foot],
-        duration=outcome.duration,
-        displacement=np.array([outcome.displacement_x, outcome.displacement_z]),
-        heading_change=outcome.heading_change,
-        mass_offset=outcome.mass_offset,
-        fall=fall,
-        least_normal_force=outcome.least_normal_force,
-        greatest_friction=outcome.greatest_friction,
-        energy=EnergyLedger(
-            outcome.gravity_work, outcome.shift_work, outcome.impact_loss, outcome.ankle_loss
-        ),
-        evaluations=int(outcome.evaluations),
-    )
+def walk_arrays(start: Vector, foot: Foot, results: Sequence[StepResult]) -> dict[str, Any]:
+    """The fields of ``BaseWalk`` from the steps begun, of which the last may be a fall."""
+    completed = [result for result in results if result.fall is None]
+    return {
+        "states": np.array([start, *(result.state for result in completed)]),
+        "stances": (foot, *(result.stance for result in completed)),
+        "footprints": np.cumsum([np.zeros(2), *(r.displacement for r in completed)], axis=0),
+        "durations": np.array([result.duration for result in completed]),
+        "fall": results[-1].fall,
+    }
 
 
 def _centre_path(rows: Vector, heading: float, footprint: Vector, time: float) -> Vector:
     """Times and positions of the centre of mass in the floor frame from a trace in the stance frame."""
     cosine, sine = np.cos(heading), np.sin(heading)
     ahead, up, right = (rows[:, COLUMNS.index(f"centre_{axis}")] for axis in "xyz")
-    return np.column_stack(
-        [
-            rows[:, 0] + time,
-            footprint[0] + cosine * ahead + sine * right,
-            up,
-            footprint[1] - sine * ahead + cosine * right,
-        ]
-    )
+    downhill = footprint[0] + cosine * ahead + sine * right
+    aside = footprint[1] - sine * ahead + cosine * right
+    return np.column_stack([rows[:, 0] + time, downhill, up, aside])

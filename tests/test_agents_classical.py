@@ -31,6 +31,7 @@ from lean_yaw_env.analysis.limit_cycle import cycle_at, find_gait
 from lean_yaw_env.envs.options import EnvOptions, gait_of
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.errors import NoGaitError
+from lean_yaw_env.kernel.records import Command
 from lean_yaw_env.parameters import MIRROR
 
 WEIGHTS = LqrWeights()
@@ -42,7 +43,7 @@ AGENTS_BY_TASK = {task: guided(task, EnvOptions()) for task in TASKS}
 
 @pytest.fixture(scope="module")
 def schedule() -> GainSchedule:
-    return GainSchedule(WalkerParameters(), WEIGHTS)
+    return GainSchedule(WalkerParameters(), WEIGHTS, Pumping())
 
 
 def mirrored_step(walker, state, offset, angle, change):
@@ -54,7 +55,7 @@ def mirrored_step(walker, state, offset, angle, change):
 
 
 def test_the_linear_step_is_the_limit_of_small_differences(walker, gait):
-    step = linearise_step(walker, gait, 0.3, 0.0)
+    step = linearise_step(walker, gait, Command(0.3, 0.0, 0.0))
     small = 1e-6
     for column in range(6):
         nudge = small * np.eye(6)[column]
@@ -71,7 +72,7 @@ def test_the_linear_step_is_the_limit_of_small_differences(walker, gait):
 @pytest.mark.parametrize("offsets", [(0.0, 0.0), (0.02, -0.015)])
 def test_the_speed_s_derivatives_are_the_limit_of_small_differences(walker, gait, offsets):
     start, (before, change) = gait + 0.2 * np.eye(5)[0], offsets
-    exact = linearise_step(walker, start, 0.3, before + change, before).speed
+    exact = linearise_step(walker, start, Command(0.3, before + change, before)).speed
 
     def speed(point):
         step = walker.step(
@@ -100,8 +101,8 @@ def test_feedback_pulls_all_eigenvalues_of_the_stride_inside_those_of_the_open_l
     offset = -math.tan(0.01) * math.sin(heading)
     left, right = _held_gaits(walker, offset)
     now, then = (
-        linearise_step(walker, left, 0.3, offset),
-        linearise_step(walker, right, 0.3, -offset),
+        linearise_step(walker, left, Command(0.3, offset, offset)),
+        linearise_step(walker, right, Command(0.3, -offset, -offset)),
     )
     one, other = periodic_gains(now, then, WEIGHTS)
     again = periodic_gains(then, now, WEIGHTS)
@@ -121,7 +122,7 @@ def _held_gaits(walker, offset):
 
 @pytest.mark.parametrize("weights", [WEIGHTS, LqrWeights(speed=0.05)])
 def test_the_gain_is_worth_no_less_than_any_near_it(walker, gait, weights):
-    step = linearise_step(walker, gait, 0.3, 0.0)
+    step = linearise_step(walker, gait, Command(0.3, 0.0, 0.0))
     gain = periodic_gains(step, step, weights)[0]
     state_cost, input_cost = weights.matrices()
 
@@ -154,7 +155,7 @@ def test_gaits_are_as_fast_as_their_linear_steps_say(walker):
 
 
 def test_the_last_turn_follows_from_the_state_that_it_left(walker, gait):
-    weights = last_turn(linearise_step(walker, gait, 0.3, 0.0), WEIGHTS)
+    weights = last_turn(linearise_step(walker, gait, Command(0.3, 0.0, 0.0)), WEIGHTS)
     base = walker.step(gait)
     rng = np.random.default_rng(1)
     for _ in range(20):

@@ -15,14 +15,13 @@ from typer.testing import CliRunner
 
 from agents import FixedController, HeadingFeedback, HeadingGains, RandomController
 from agents.command_line import app
-from agents.evaluation.closed_loop import write_report
 from agents.evaluation.closed_loop_interface import closed_loop
+from agents.evaluation.closed_loop_page import csv_text, write_report
 from agents.evaluation.closed_loop_report import (
     LINES,
     REACHES,
     ZERO,
     box_survival,
-    csv_text,
     examine,
     plain,
 )

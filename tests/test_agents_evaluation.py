@@ -15,12 +15,11 @@ from agents.evaluation.episodes import Results, Row, summary
 from agents.evaluation.row_tables import results_table, rows_to_csv, rows_to_json
 from agents.evaluation.scoring import evaluate, run_episodes
 from agents.seeds import (
-    EVALUATION_SEEDS,
     MOST_EPISODES,
+    MOST_EVALUATIONS,
     MOST_WALKERS,
     TRAINING_SEEDS,
-    TUNING_SEEDS,
-    evaluation_seed,
+    first_seed,
     training_seed,
 )
 from lean_yaw_env.envs.options import EnvOptions
@@ -29,18 +28,19 @@ from lean_yaw_env.envs.walker_env import WalkerEnv
 SHORT = EnvOptions(horizon=15.0)
 
 
-def test_seeds_of_training_tuning_and_evaluation_share_no_episode():
-    assert training_seed(TRAINING_SEEDS - 1) + MOST_WALKERS <= TUNING_SEEDS
-    assert TUNING_SEEDS + MOST_EPISODES <= EVALUATION_SEEDS == evaluation_seed(0)
+def test_training_validation_and_test_share_no_episode():
+    assert training_seed(TRAINING_SEEDS - 1) + MOST_WALKERS <= first_seed("test")
+    assert first_seed("test", MOST_EVALUATIONS - 1) + MOST_EPISODES <= first_seed("validation")
     assert training_seed(1) == training_seed(0) + MOST_WALKERS
-    assert evaluation_seed(1) == evaluation_seed(0) + MOST_EPISODES
+    for episode_set in ("validation", "test"):
+        assert first_seed(episode_set, 1) == first_seed(episode_set) + MOST_EPISODES
 
 
 def test_an_evaluated_episode_is_the_single_environment_s():
     results = run_episodes(HeadingFeedback(), "Heading", episodes=3, seed=2, options=SHORT)
     env = WalkerEnv("Heading", horizon=15.0)
     for i in range(3):
-        observation, info = env.reset(seed=evaluation_seed(2) + i)
+        observation, info = env.reset(seed=first_seed("validation", 2) + i)
         total, ends = 0.0, False
         while not ends:
             action, _ = HeadingFeedback().predict(observation)

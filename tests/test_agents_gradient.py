@@ -13,16 +13,16 @@ from agents import load, save
 from agents.controllers.simple import FixedController
 from agents.evaluation.scoring import run_seeds
 from agents.learning.algorithms import settings_for, train
-from agents.learning.apg import GradientSettings, make_policy
+from agents.learning.apg import GradientSettings, perceptron
 from agents.learning.differentiable import (
     DifferentiableWalkers,
-    Window,
+    Steps,
     bounded,
     time_discounted_returns,
 )
 from agents.learning.recorder import CheckpointError
-from agents.seeds import TUNING_SEEDS
-from lean_yaw_env.envs.linearised import LinearisedSteps
+from agents.seeds import first_seed
+from lean_yaw_env.envs.derivatives import LinearisedSteps
 from lean_yaw_env.envs.options import EnvOptions, gait_of
 from lean_yaw_env.envs.state import WALKER
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
@@ -32,6 +32,7 @@ from lean_yaw_env.kernel.records import STEPPED, Outcome
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.registration import TASK_VERSIONS
 
+VALIDATION = first_seed("validation")
 ID = "LeanYaw/Heading-v0"
 TINY = GradientSettings(
     steps=1280,
@@ -130,7 +131,7 @@ def test_gradient_through_a_window_of_a_task_agrees_with_central_differences(tas
 
 def test_gradient_by_a_policy_s_weights_agrees_with_central_differences():
     generator = torch.Generator().manual_seed(1)
-    policy = make_policy(7, 2, (8,), generator).double()
+    policy = perceptron(7, (8,), 2, 0.01, generator).double()
     direction = [torch.randn(w.shape, generator=generator).double() for w in policy.parameters()]
 
     def total(along):
@@ -254,7 +255,7 @@ def test_jacobians_of_steps_agree_with_differences_of_steps(task):
 # --- returns
 
 
-def window_of(durations, rate=1.0, terminated=None, truncated=None) -> Window:
+def window_of(durations, rate=1.0, terminated=None, truncated=None) -> Steps:
     """One walker's window of steps that earn a rate of reward."""
     durations = torch.as_tensor(durations, dtype=torch.float64)[:, None]
     none = torch.zeros_like(durations, dtype=torch.bool)
@@ -263,7 +264,7 @@ def window_of(durations, rate=1.0, terminated=None, truncated=None) -> Window:
         if step is not None:
             end[step] = True
     empty = torch.zeros(len(durations), 1, 1)
-    return Window(empty, empty, rate * durations, durations, ends[0], ends[1])
+    return Steps(empty, empty, rate * durations, durations, *ends, durations, durations)
 
 
 @pytest.mark.parametrize("trace", [0.0, 0.7, 1.0])
@@ -308,7 +309,7 @@ def test_a_short_training_steers_better_than_the_fixed_controller():
         steps=24_000, walkers=32, window=32, critic_first=6_000, hidden=(32, 32)
     )
     policy = train("apg", ID, settings, seed=1, progress=False).policy
-    seeds = range(TUNING_SEEDS, TUNING_SEEDS + 48)
+    seeds = range(VALIDATION, VALIDATION + 48)
     errors = [
         run_seeds(agent, "Heading", seeds).metrics["mean_absolute_heading_error"].mean()
         for agent in (policy, FixedController())

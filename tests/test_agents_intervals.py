@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
-from agents.evaluation.intervals import RESAMPLES, resample, share_estimate
+from agents.evaluation.intervals import RESAMPLES, holm, resample, share_estimate
 
 RNG_SEED = 7
 
@@ -117,3 +117,23 @@ def test_the_interval_of_a_share_is_as_wide_as_trainings_differ():
 def test_nothing_to_draw_from_is_refused():
     with pytest.raises(ValueError, match="one training and one episode"):
         resample(np.empty((0, 3)))
+
+
+def test_p_values_of_paired_normal_differences_are_near_student_s():
+    difference = normal(1, 200) - 3.0 + 0.3
+    drawn = resample(difference, resamples=10_000)
+    expected = stats.ttest_1samp(difference[0], 0.0).pvalue
+    # 10,000 resamples know a share of 0.05 to 0.004; the bootstrap's tails are those of 200 values
+    assert drawn.p_value() == pytest.approx(expected, abs=0.015)
+
+
+def test_the_p_value_of_no_difference_is_one_and_of_a_constant_one_the_smallest_there_is():
+    assert resample(np.zeros((1, 20))).p_value() == 1.0
+    assert resample(np.ones((1, 20))).p_value() == pytest.approx(2.0 / (RESAMPLES + 1))
+
+
+def test_holm_s_correction_is_that_of_its_definition():
+    # Holm (1979): the smallest of n counts n times, the next n - 1 times, and none falls below an earlier one
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.6, 0.7]) == [1.0, 1.0]
+    assert holm([]) == []

@@ -14,22 +14,21 @@ from agents import FixedController, RandomController
 from agents.command_line import app
 from agents.evaluation import plan
 from agents.evaluation.comparison import (
+    Claim,
     best_feedback,
-    compare,
-    expectations_of,
-    samples_of,
-    task_rows,
+    claims_of,
+    compared_rows,
+    rivals_of,
 )
-from agents.evaluation.episodes import RETURN, SURVIVAL, Episodes, Results, is_share
-from agents.evaluation.footprint_pictures import record_episode
+from agents.evaluation.episodes import RETURN, SURVIVAL, Episodes, Results, direction, is_share
 from agents.evaluation.leaderboard import (
-    Circumstances,
     leaderboard_page,
     level_candidates,
     level_rows,
     make_leaderboard,
 )
-from agents.evaluation.plan import Candidate, Evaluation, run_all
+from agents.evaluation.plan import Candidate, Evaluation
+from agents.evaluation.recording import record_episode
 from agents.evaluation.scoring import run_episodes
 from agents.registry import (
     AGENTS,
@@ -40,6 +39,7 @@ from agents.registry import (
     make_all,
     names_for,
 )
+from agents.seeds import first_seed
 from lean_yaw_env import Walker
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
@@ -49,6 +49,10 @@ from lean_yaw_env.rendering.palette import AGENT_COLOURS
 
 SHORT = EnvOptions(horizon=8.0)
 EPISODES = 6
+
+
+def run_all(candidates: list[Candidate], **arguments) -> list[Results]:
+    return Evaluation(progress=False, **arguments).run(candidates)
 
 
 def walked(task: str, agent: str, returns: np.ndarray, **metrics: np.ndarray) -> Results:
@@ -71,14 +75,22 @@ def returns(mean: float, trainings: int = 1) -> np.ndarray:
     return mean + episodes + noise
 
 
-SAMPLES = samples_of(
-    [
-        walked("Heading", "random", returns(10.0)),
-        walked("Heading", "fixed", returns(12.0)),
-        walked("Heading", "feedback", returns(15.0)),
-        walked("Heading", "lqr", returns(20.0)),
-        walked("Heading", "ppo", returns(21.0, trainings=3)),
-    ]
+def named(*results: Results) -> dict[str, Results]:
+    return {each.agent: each for each in results}
+
+
+def claim(results: dict[str, Results], better: str, worse: str) -> Claim:
+    """That one of these agents of Heading is better than another, with no other claim beside it."""
+    rival = {"Heading": worse}
+    return next(each for each in claims_of({"Heading": results}, rival) if each.better == better)
+
+
+SAMPLES = named(
+    walked("Heading", "random", returns(10.0)),
+    walked("Heading", "fixed", returns(12.0)),
+    walked("Heading", "feedback", returns(15.0)),
+    walked("Heading", "lqr", returns(20.0)),
+    walked("Heading", "ppo", returns(21.0, trainings=3)),
 )
 
 
@@ -97,12 +109,14 @@ def test_the_best_feedback_controller_is_neither_the_baseline_nor_the_learned():
 
 
 def test_a_small_difference_on_the_same_episodes_is_seen_through_their_spread():
-    comparison = compare(SAMPLES["ppo"], SAMPLES["lqr"], RETURN)
+    found = claim(named(SAMPLES["ppo"], SAMPLES["lqr"]), "ppo", "lqr")
     # episodes spread by 5, agents differ by 1 on each
-    assert comparison.verdict == "better"
-    assert comparison.mean.low > 0.5
-    assert compare(SAMPLES["lqr"], SAMPLES["ppo"], RETURN).verdict == "worse"
-    assert compare(SAMPLES["lqr"], SAMPLES["lqr"], RETURN).verdict == "tie"
+    assert found.verdict == "better" and found.p_value < 0.001
+    assert found.comparison.mean.low > 0.5
+    assert claim(named(SAMPLES["lqr"], SAMPLES["ppo"]), "lqr", "ppo").verdict == "worse"
+    twin = replace(SAMPLES["lqr"], agent="fixed")
+    found = claim(named(SAMPLES["lqr"], twin), "fixed", "lqr")
+    assert found.verdict == "tie" and found.p_value == 1.0
 
 
 def test_of_an_error_less_is_better():
@@ -111,48 +125,79 @@ def test_of_an_error_less_is_better():
         walked("Heading", name, returns(5.0), **{error: value * np.ones((1, 60))})
         for name, value in (("lqr", 0.1), ("fixed", 0.3))
     )
-    samples = samples_of([low, high])
-    assert compare(samples["lqr"], samples["fixed"], error).verdict == "better"
+    rows, _ = compared_rows({"Heading": named(low, high)}, {"Heading": "lqr"})
+    row = next(row for row in rows if (row.agent, row.metric) == ("fixed", error))
+    assert row.difference == pytest.approx(0.2) and direction("Heading", error) == -1
+    assert row.verdict is None  # only the headline is claimed
 
 
 def test_a_mean_and_an_interquartile_mean_that_disagree_are_called_mixed():
     steady = walked("Heading", "lqr", np.full((1, 60), 10.0))
     failing = np.full((1, 60), 10.1)
     failing[0, :8] = 0.0  # better in most episodes, and falls in some
-    samples = samples_of([steady, walked("Heading", "fixed", failing)])
-    assert compare(samples["fixed"], samples["lqr"], RETURN).verdict == "mixed"
+    results = named(steady, walked("Heading", "fixed", failing))
+    assert claim(results, "fixed", "lqr").verdict == "mixed"
 
 
 def test_an_agent_that_walked_fewer_episodes_is_compared_on_those():
     few = walked("Heading", "feedback", returns(19.0)[:, :20])
-    samples = samples_of([SAMPLES["lqr"].results, few])
-    comparison = compare(samples["feedback"], samples["lqr"], RETURN)
-    assert comparison.episodes == 20
-    assert comparison.verdict == "worse"
+    found = claim(named(SAMPLES["lqr"], few), "feedback", "lqr")
+    assert found.comparison.episodes == 20
+    assert found.verdict == "worse"
+
+
+def test_a_few_episodes_make_no_claim_however_clear_they_are():
+    results = named(
+        walked("Heading", "lqr", np.full((1, 4), 10.0)),
+        walked("Heading", "mpc", np.full((1, 4), 11.0)),
+    )
+    found = claim(results, "mpc", "lqr")
+    # four equal signs by chance: 2 / 2^4
+    assert found.p_value == 0.125 and found.verdict == "tie"
 
 
 def test_rows_say_against_whom_and_leave_undefined_episodes_uncompared():
     holed = returns(12.0)
     holed[0, 3] = np.nan
-    results = walked("Heading", "fixed", returns(12.0), settled_fraction=holed)
-    rows = {
-        (row.agent, row.metric): row
-        for row in task_rows(samples_of([results, SAMPLES["lqr"].results]))
-    }
+    results = named(
+        walked("Heading", "fixed", returns(12.0), settled_fraction=holed), SAMPLES["lqr"]
+    )
+    found, _ = compared_rows({"Heading": results}, rivals_of({"Heading": results}))
+    rows = {(row.agent, row.metric): row for row in found}
     assert rows["fixed", RETURN].against == "lqr"
     assert rows["fixed", RETURN].verdict == "worse"
-    assert rows["fixed", "settled_fraction"].verdict is None
-    assert rows["fixed", "commands"].verdict is None  # it only describes
+    assert rows["fixed", "settled_fraction"].against is None
+    assert rows["fixed", "commands"].against is None  # it only describes
     assert rows["lqr", RETURN].against is None
 
 
-def test_random_is_expected_below_fixed_below_feedback_below_learned():
-    expectations = expectations_of("Heading", SAMPLES)
-    assert [(each.worse, each.better, each.holds) for each in expectations] == [
-        ("random", "fixed", True), ("fixed", "lqr", True), ("lqr", "ppo", True),
+def test_claims_are_of_fixed_over_random_and_of_every_agent_over_the_rival():
+    claims = claims_of({"Heading": SAMPLES}, {"Heading": "lqr"})
+    assert [(each.better, each.worse, each.verdict) for each in claims] == [
+        ("fixed", "random", "better"), ("random", "lqr", "worse"), ("fixed", "lqr", "worse"),
+        ("feedback", "lqr", "worse"), ("ppo", "lqr", "better"),
     ]  # fmt: skip
-    few = {name: SAMPLES[name] for name in ("lqr", "feedback")}
-    assert not any(each.holds for each in expectations_of("Heading", few))
+    assert claims_of({"Heading": SAMPLES}, {"Heading": None})[0].better == "fixed"
+    assert len(claims_of({"Heading": SAMPLES}, {})) == 1
+
+
+def test_a_claim_needs_a_smaller_p_value_the_more_claims_there_are():
+    noise = np.random.default_rng(3).normal(0.0, 1.0, (1, 60))
+    slight = walked("Heading", "feedback", returns(20.0) + 0.3 + noise)
+    alone = claim(named(SAMPLES["lqr"], slight), "feedback", "lqr")
+    assert alone.holds and alone.p_value == alone.comparison.p_value > 0.001
+    twins = [replace(slight, agent=f"twin{k}") for k in range(40)]
+    among = claim(named(SAMPLES["lqr"], slight, *twins), "feedback", "lqr")
+    assert among.comparison == alone.comparison
+    assert among.p_value == pytest.approx(min(41 * alone.p_value, 1.0))
+    assert among.verdict == "tie"
+
+
+def test_an_agent_is_drawn_alike_whoever_else_is_evaluated():
+    alone = compared_rows({"Heading": named(SAMPLES["ppo"])}, {})[0]
+    among = compared_rows({"Heading": SAMPLES}, {})[0]
+    # NaN is no equal of itself
+    assert repr(alone) == repr([row for row in among if row.agent == "ppo"])
 
 
 def test_every_agent_has_a_kind_and_is_made_for_its_tasks_alone():
@@ -174,7 +219,7 @@ def test_learned_agents_are_there_where_a_training_is_found(tmp_path: Path):
 
 def test_episodes_walked_in_parts_are_those_of_one_evaluation(monkeypatch):
     monkeypatch.setattr(plan, "_CHUNK", 4)
-    found = run_all([Candidate("Walk", "fixed", EPISODES, SHORT)], seed=3)[0].results
+    found = run_all([Candidate("Walk", "fixed", EPISODES, SHORT)], seed=3)[0]
     whole = run_episodes(FixedController(), "Walk", episodes=EPISODES, seed=3, options=SHORT)
     for name, values in whole.metrics.items():
         assert np.array_equal(found.values(name)[0], values)
@@ -199,7 +244,7 @@ def test_an_interrupted_evaluation_goes_on_and_loses_nothing(tmp_path: Path, mon
     again = run_all(candidates, cache=tmp_path)
     assert len(calls) == 3  # the first agent's are not walked again
     for one, other in zip(expected, again, strict=True):
-        assert np.array_equal(one.results.values(RETURN), other.results.values(RETURN))
+        assert np.array_equal(one.values(RETURN), other.values(RETURN))
     assert run_all(candidates, cache=tmp_path)[0].seconds == again[0].seconds
     assert len(calls) == 3
 
@@ -224,14 +269,14 @@ def test_a_damaged_file_is_walked_again(tmp_path: Path):
     first = run_all([candidate], cache=tmp_path)[0]
     next(tmp_path.iterdir()).write_bytes(b"PK damaged")
     again = run_all([candidate], cache=tmp_path)[0]
-    assert np.array_equal(first.results.values(RETURN), again.results.values(RETURN))
+    assert np.array_equal(first.values(RETURN), again.values(RETURN))
 
 
 def test_two_processes_give_the_results_of_one(monkeypatch):
     monkeypatch.setattr(plan, "_WORTH_PROCESSES", 2)
     candidates = [Candidate("Walk", name, 3, SHORT) for name in ("fixed", "random")]
     for one, two in zip(run_all(candidates), run_all(candidates, processes=2), strict=True):
-        assert np.array_equal(one.results.values(RETURN), two.results.values(RETURN))
+        assert np.array_equal(one.values(RETURN), two.values(RETURN))
 
 
 def test_push_levels_are_walked_by_the_agents_of_push_alone():
@@ -244,19 +289,22 @@ def test_push_levels_are_walked_by_the_agents_of_push_alone():
 
 def test_a_recorded_episode_keeps_goals_and_path():
     waypoint = record_episode(FixedController(), "Waypoint", seed=1, most_steps=5)
-    assert not waypoint.goals[-1].reached
-    assert waypoint.goals[0].radius == 0.5
+    assert not waypoint.scene.goals[-1].reached
+    assert waypoint.scene.goals[0].radius == 0.5
     slalom = record_episode(FixedController(), "Slalom", seed=1, most_steps=5)
-    assert slalom.reference_path is not None and slalom.reference_path.shape[1] == 2
-    assert not slalom.goals
-    assert record_episode(RandomController(0), "Walk", seed=1, most_steps=5).reference_path is None
+    assert slalom.scene.reference_path is not None and slalom.scene.reference_path.shape[1] == 2
+    assert not slalom.scene.goals
+    assert (
+        record_episode(RandomController(0), "Walk", seed=1, most_steps=5).scene.reference_path
+        is None
+    )
 
 
 def test_a_random_body_s_path_is_walked_by_that_body():
     options = EnvOptions(random_body="training", start_disturbance=0.0)
     episode = record_episode(FixedController(), "Walk", seed=3, options=options, most_steps=6)
-    assert episode.body != EnvOptions().walker_parameters(task_named("Walk"))
-    walker = Walker(episode.body)
+    assert episode.scene.parameters != EnvOptions().walker_parameters(task_named("Walk"))
+    walker = Walker(episode.scene.parameters)
     # the path in a step ends where that body's own step takes it: at the time of the next heel strike
     env = WalkerEnv("Walk", **vars(options))
     _, info = env.reset(seed=3)
@@ -280,7 +328,7 @@ def test_every_agent_has_a_colour_of_its_own():
 def test_the_leaderboard_holds_every_agent_and_the_command_that_made_it(tmp_path: Path):
     evaluation = Evaluation(episodes=4, options=SHORT, cache=tmp_path / "kept", progress=False)
     candidates = evaluation.candidates(["Walk", "Push"], ["random", "fixed"])
-    rows = make_leaderboard(candidates, evaluation, tmp_path / "docs", "make it")
+    rows, _ = make_leaderboard(candidates, evaluation, tmp_path / "docs", "make it")
     page = (tmp_path / "docs" / "leaderboard.md").read_text()
     assert page.startswith("# Leaderboard\n\nThis page is generated by `make it`")
     for words in ("## Walk", "## Push", "| random | baseline |", "random < fixed", "0.2 | 0.4"):
@@ -292,18 +340,39 @@ def test_the_leaderboard_holds_every_agent_and_the_command_that_made_it(tmp_path
 
 
 def test_a_page_says_plainly_what_does_not_hold():
-    samples = samples_of(
-        [
-            walked("Heading", "lqr", returns(20.0)),
-            walked("Heading", "ppo", returns(20.0, trainings=2) - 0.001),
-            walked("Heading", "sac", returns(15.0, trainings=2)),
-        ]
+    results = named(
+        walked("Heading", "lqr", returns(20.0)),
+        walked("Heading", "ppo", returns(20.0, trainings=2) - 0.001),
+        walked("Heading", "sac", returns(15.0, trainings=2)),
     )
-    made = Circumstances("make it", 0, 60.0, "a machine")
-    page = leaderboard_page(task_rows(samples), {"Heading": samples}, [], made)
+    rows, claims = compared_rows({"Heading": results}, {"Heading": "lqr"})
+    page = leaderboard_page(rows, claims, {}, "Made by a test.")
     assert "no: no significant difference from lqr" in page
     assert "no: sac is worse than lqr" in page
     assert "**ppo** is better than the best feedback controller on no task" in page
+    assert "The correction is for 2 claims" in page
+
+
+def test_the_rival_is_chosen_on_validation_and_only_the_leaderboard_reads_the_test(
+    tmp_path: Path, monkeypatch
+):
+    read: list[tuple[str, int]] = []
+    real = plan.run_seeds
+
+    def recorded(agent, task, seeds, **options):
+        read.append((type(agent).__name__, seeds.start))
+        return real(agent, task, seeds, **options)
+
+    monkeypatch.setattr(plan, "run_seeds", recorded)
+    evaluation = Evaluation(episodes=2, options=SHORT, progress=False)
+    candidates = evaluation.candidates(["Heading"], ["fixed", "feedback", "lqr"])
+    evaluation.run(candidates)
+    assert {start for _, start in read} == {first_seed("validation")}
+    read.clear()
+    make_leaderboard(candidates, evaluation, tmp_path, "make it")
+    names = ["HeadingFeedback", "HeadingLqr"]
+    assert read[:2] == [(name, first_seed("validation")) for name in names]
+    assert {start for _, start in read[2:]} == {first_seed("test")}
 
 
 def test_pictures_alone_are_drawn_by_one_option(tmp_path: Path):

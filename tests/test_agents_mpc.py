@@ -12,20 +12,21 @@ from agents.controllers.mpc import MpcController
 from agents.controllers.mpc_rollouts import Rollouts
 from agents.controllers.mpc_settings import MpcSettings, PlanSpread
 from agents.controllers.simple import FixedController
-from agents.evaluation.footprint_pictures import record_episode
+from agents.evaluation.recording import record_episode
 from agents.evaluation.scoring import run_seeds
-from agents.seeds import TUNING_SEEDS
+from agents.seeds import first_seed
 from agents.settings import tuned
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.registration import TASK_VERSIONS
 
+VALIDATION = first_seed("validation")
 TINY = MpcSettings(horizon=8, knots=(0, 3, 6), samples=12, iterations=2, elites=4)
 WALKERS = 3
 
 
-def started(task, n=WALKERS, seed=TUNING_SEEDS, steps=5, **options):
+def started(task, n=WALKERS, seed=VALIDATION, steps=5, **options):
     """A vector environment some random steps into its episodes."""
     env = WalkerVectorEnv(n, task, **options)
     env.reset(seed=seed)
@@ -124,7 +125,7 @@ def test_planning_alone_steers():
     options = EnvOptions(horizon=50.0)
     settings = replace(TINY, horizon=14, knots=(0, 4, 9), samples=24)
     planner = MpcController("Heading", options, settings, base=FixedController())
-    seeds = range(TUNING_SEEDS, TUNING_SEEDS + 8)
+    seeds = range(VALIDATION, VALIDATION + 8)
     planned = run_seeds(planner, "Heading", seeds, options=options)
     fixed = run_seeds(FixedController(), "Heading", seeds, options=options)
     assert planned.survived.all()
@@ -137,7 +138,7 @@ def test_fewer_scenarios_than_kept_already_stay_up_longer_under_pushes_than_the_
     planner = MpcController(
         "Push", options, replace(tuned("mpc", "Push", MpcSettings()), scenarios=4)
     )
-    seeds = range(TUNING_SEEDS, TUNING_SEEDS + 8)
+    seeds = range(VALIDATION, VALIDATION + 8)
     planned = run_seeds(planner, "Push", seeds, options=options)
     fixed = run_seeds(FixedController(), "Push", seeds, options=options)
     # of 1,000 episodes the fixed controller is still up after 60 in one of eight; as many are enough to tell that from most
@@ -149,7 +150,7 @@ def test_every_task_has_settings_and_a_planner_that_walks(task):
     options = EnvOptions(horizon=3.0)
     # the regulators would take most of the time: their gaits are found at first use
     planner = MpcController(task, options, base=FixedController())
-    results = run_seeds(planner, task, range(TUNING_SEEDS, TUNING_SEEDS + 2), options=options)
+    results = run_seeds(planner, task, range(VALIDATION, VALIDATION + 2), options=options)
     assert results.survived.all()
 
 
@@ -169,7 +170,7 @@ def test_the_planner_of_that_name_plans_around_the_regulator():
 def test_planners_work_for_recording_and_delayed_actions_and_bodies_unknown():
     options = EnvOptions(action_delay=True, random_body="held-out", horizon=10.0)
     planner = MpcController("Heading", options, TINY)
-    assert record_episode(planner, "Heading", seed=TUNING_SEEDS, options=options).fall is None
+    assert record_episode(planner, "Heading", seed=VALIDATION, options=options).fall is None
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
 import pickle
 import subprocess
 import sys
@@ -11,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import safetensors.numpy
+import safetensors.torch
 import torch
 
 import agents
@@ -196,6 +199,36 @@ def test_damaged_or_missing_files_are_refused(folder):
         agents.load(folder / "nowhere")
 
 
+@pytest.mark.parametrize("kind", ["bfloat16", "float8_e4m3fn", "float8_e5m2", "float16", "float64"])
+def test_weights_of_other_number_formats_are_refused(folder, kind):
+    kept = {
+        name: torch.from_numpy(value).to(getattr(torch, kind)) for name, value in weights().items()
+    }
+    data = safetensors.torch.save(kept)
+    (folder / policy_files.WEIGHTS_FILE).write_bytes(data)
+    change(folder, weights_sha256=hashlib.sha256(data).hexdigest())
+    with pytest.raises(agents.PolicyFileError, match="float32"):
+        agents.load(folder)
+
+
+@pytest.mark.parametrize("name", [policy_files.CARD_FILE, policy_files.WEIGHTS_FILE])
+@pytest.mark.parametrize("kind", ["folder", "pipe", "device", "huge"])
+@pytest.mark.skipif(os.name == "nt", reason="there are no pipes and devices among files")
+def test_what_is_no_regular_file_of_moderate_size_is_refused_and_not_opened(folder, name, kind):
+    (folder / name).unlink()
+    if kind == "folder":
+        (folder / name).mkdir()
+    elif kind == "pipe":
+        os.mkfifo(folder / name)  # opening it would wait for a writer
+    elif kind == "device":
+        (folder / name).symlink_to("/dev/zero")  # reading it would never end
+    else:
+        with (folder / name).open("wb") as file:
+            file.truncate(2**40)  # a sparse file, larger than memory
+    with pytest.raises(agents.PolicyFileError, match=r"not a regular file|at most .* are read"):
+        agents.load(folder)
+
+
 def test_weights_that_are_no_network_are_refused():
     good = weights()
     for name, value, message in [
@@ -249,12 +282,12 @@ def test_the_policy_taken_from_a_training_acts_as_the_trained_network(tmp_path):
     arrays = safetensors.numpy.load((tmp_path / "c.safetensors").read_bytes())
     names = ("mlp_extractor.policy_net.0", "mlp_extractor.policy_net.2", "action_net")
     observation = np.random.default_rng(0).normal(size=(20, FEATURES)).astype(np.float32)
-    normal = (observation - arrays["observations.mean"]) / np.sqrt(
-        arrays["observations.var"] + 1e-8
+    normal = (observation - arrays["observations/mean"]) / np.sqrt(
+        arrays["observations/var"] + 1e-8
     )
     signal = np.clip(normal, -10.0, 10.0)
     for k, name in enumerate(names):
-        signal = signal @ arrays[f"policy.{name}.weight"].T + arrays[f"policy.{name}.bias"]
+        signal = signal @ arrays[f"policy/{name}.weight"].T + arrays[f"policy/{name}.bias"]
         signal = np.tanh(signal) if k < 2 else np.clip(signal, -1.0, 1.0)
     # float32 against float64
     assert trained.policy.predict(observation)[0] == pytest.approx(signal, abs=1e-5)

@@ -10,12 +10,13 @@ from gymnasium import spaces
 
 from agents import load, save
 from agents.learning import stable_baselines
-from agents.learning.algorithms import ALGORITHMS, settings_for, settings_from_plain, train
+from agents.learning.algorithms import ALGORITHMS, settings_for, train
 from agents.learning.experience import TimeDiscountedReplay
 from agents.learning.learner import settings_to_plain
 from agents.learning.recorder import CheckpointError, read_checkpoint
 from agents.learning.runs import Training, make_run, run
 from agents.learning.sac import SACSettings
+from agents.settings import with_values
 from lean_yaw_env.envs.options import EnvOptions
 
 ID = "LeanYaw/Heading-v0"
@@ -81,7 +82,7 @@ def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, monkeypatch, mome
     with pytest.raises(Interruption):
         train("sac", ID, TINY, **arguments)
     monkeypatch.setattr(stable_baselines._Callback, "_on_step", original)
-    assert int(read_checkpoint(checkpoint)["count.steps"]) == moment
+    assert int(read_checkpoint(checkpoint)["steps"]) == moment
     np.random.seed(99)  # noqa: NPY002 - the resumed training must not depend on it
     torch.manual_seed(99)
     resumed = train("sac", ID, TINY, **arguments)
@@ -95,15 +96,15 @@ def test_the_policy_acts_and_draws_as_the_trained_network(tmp_path):
     trained = train("sac", ID, TINY, seed=1, options=SHORT, checkpoint=tmp_path / "c.safetensors", progress=False)  # fmt: skip
     arrays = safetensors.numpy.load((tmp_path / "c.safetensors").read_bytes())
     observation = np.random.default_rng(0).normal(size=(20, FEATURES)).astype(np.float32)
-    normal = (observation - arrays["observations.mean"]) / np.sqrt(
-        arrays["observations.var"] + 1e-8
+    normal = (observation - arrays["observations/mean"]) / np.sqrt(
+        arrays["observations/var"] + 1e-8
     )
     signal = np.clip(normal, -10.0, 10.0)
     for k in (0, 2):
-        name = f"policy.actor.latent_pi.{k}"
+        name = f"policy/actor.latent_pi.{k}"
         signal = np.maximum(signal @ arrays[f"{name}.weight"].T + arrays[f"{name}.bias"], 0.0)
     mean, log_std = (
-        signal @ arrays[f"policy.actor.{name}.weight"].T + arrays[f"policy.actor.{name}.bias"]
+        signal @ arrays[f"policy/actor.{name}.weight"].T + arrays[f"policy/actor.{name}.bias"]
         for name in ("mu", "log_std")
     )
     save(trained.policy, tmp_path / "saved")
@@ -138,7 +139,7 @@ def test_a_checkpoint_of_other_settings_is_refused(tmp_path):
 def test_settings_of_every_algorithm_survive_json():
     for name, entry in ALGORITHMS.items():
         settings = settings_for(name, entry.tasks[0])
-        assert settings_from_plain(name, settings_to_plain(settings)) == settings
+        assert with_values(entry.settings(), settings_to_plain(settings)) == settings
 
 
 def test_bad_settings_are_refused():
@@ -148,7 +149,7 @@ def test_bad_settings_are_refused():
         ({"target_rate": 0.0}, "target_rate must be in"),
         ({"push_level": -1.0}, "push_level must be in"),
         ({"target_entropy": float("nan")}, "target_entropy must be in"),
-        ({"hidden": (0,)}, "hidden must name one layer"),
+        ({"hidden": (0,)}, "units of each layer in hidden must be from 1"),
     ]:
         with pytest.raises(ValueError, match=message):
             SACSettings(**values)

@@ -125,12 +125,12 @@ def test_a_series_goes_on_with_what_is_unfinished_and_gathers_its_seeds(tmp_path
         for row in json.loads((place / "evaluation.json").read_text())
         if (row["agent"], row["metric"]) == ("ppo", "return")
     ]
-    own = next(each for each in result.by_seed if each.metric == "return")
-    assert own.seeds == (0, 3)
-    assert list(own.means) == means
-    assert own.median == pytest.approx(np.mean(means))  # of two; rounding
+    assert result.seeds == (0, 3)
+    assert result.means["return"] == means
+    (median,) = (row[1] for row in result.rows() if row[0] == "return")
+    assert median == pytest.approx(np.mean(means))  # of two; rounding
     assert {"random", "fixed"} <= set(result.others["return"])
-    assert seeds_table(result).row_count == len(result.by_seed)
+    assert seeds_table(result).row_count == len(result.means)
     with (folder / "seeds.csv").open() as file:
         assert next(csv.reader(file)) == ["metric", "median", "lowest", "highest", "seed0", "seed3"]
     assert (folder / "learning_curves.png").stat().st_size > 0
@@ -161,9 +161,46 @@ def test_runs_side_by_side_finish_and_one_that_fails_is_named(tmp_path):
     with pytest.raises(RunError, match="seed1"):
         run_side_by_side(runs[1:], 2, progress=False)
     (runs[1] / "checkpoint.safetensors").unlink()
+    (runs[0] / "run.json").rename(runs[0] / "kept.json")
+    with pytest.raises(RunError, match="seed0"):
+        run_side_by_side(runs, 2, progress=False)
+    assert is_finished(runs[1])  # the other run went on
+    (runs[0] / "kept.json").rename(runs[0] / "run.json")
     run_side_by_side(runs, 2, progress=False)
     assert all(is_finished(place) for place in runs)
     assert all(read_log(place).seconds > 0.0 for place in runs)
+
+
+def test_a_broken_run_of_a_series_does_not_stop_the_others(tmp_path, monkeypatch):
+    folder = new_series("Walk", [0, 1], tmp_path, TINY)
+    first, second = runs_of(folder).values()
+    (first / "checkpoint.safetensors").write_bytes(b"nothing of the kind")
+    trained = []
+    original = series.run
+
+    def noted(place: Path, **keywords):
+        result = original(place, **keywords)
+        trained.append(place)
+        return result
+
+    monkeypatch.setattr(series, "run", noted)
+    with pytest.raises(RunError, match=r"seed0.*no checkpoint can be read"):
+        run_series(folder, progress=False)
+    assert trained == [second]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    ["[]", {"env_id": 3}, {"seeds": []}, {"seeds": [1, 1]}, {"seeds": ["0"]}, {"seeds": 2}, {"seeds": [0.5]}, {"seeds": [-1]}],
+)  # fmt: skip
+def test_a_damaged_series_is_refused(tmp_path, changes):
+    folder = new_series("Walk", [0, 1], tmp_path, TINY)
+    file = folder / "series.json"
+    file.write_text(
+        changes if isinstance(changes, str) else json.dumps(json.loads(file.read_text()) | changes)
+    )
+    with pytest.raises(ValueError, match="is not a series'"):
+        resumed("Walk", tmp_path, folder)
 
 
 @pytest.mark.parametrize(

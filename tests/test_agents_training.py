@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import safetensors.numpy
 import torch
 from gymnasium import spaces
 from typer.testing import CliRunner
@@ -28,6 +30,7 @@ from agents.policies import policy_files
 from agents.settings import all_settings
 from agents.shipping import ship
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.files import BusyError, locked
 
 ID = "LeanYaw/Heading-v0"
 TINY = PPOSettings(
@@ -100,7 +103,7 @@ def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, monkeypatch):
     with pytest.raises(Interruption):
         train_agent("ppo", ID, TINY, **arguments)
     monkeypatch.setattr(stable_baselines._Callback, "_on_step", original)
-    assert int(read_checkpoint(checkpoint)["count.steps"]) == 768  # the last update before
+    assert int(read_checkpoint(checkpoint)["steps"]) == 768  # the last update before
     np.random.seed(99)  # noqa: NPY002 - the resumed training must not depend on it
     torch.manual_seed(99)
     continued = train_agent("ppo", ID, TINY, **arguments)
@@ -150,7 +153,7 @@ def test_a_checkpoint_of_another_training_or_a_damaged_one_is_refused(tmp_path):
     with pytest.raises(CheckpointError, match="not of a training with these settings"):
         train_agent("ppo", ID, other, options=SHORT, checkpoint=path, progress=False)
     arrays = read_checkpoint(path)
-    del arrays["log.returns"]
+    del arrays["log"]["returns"]
     write_checkpoint(path, arrays)
     with pytest.raises(CheckpointError, match="holds no log"):
         train_agent("ppo", ID, TINY, options=SHORT, checkpoint=path, progress=False)
@@ -242,11 +245,139 @@ def test_finished_runs_are_not_resumed_and_unfinished_ones_are_found(tmp_path):
         resumed("Heading", tmp_path, folder)
 
 
-def test_a_damaged_run_is_refused(tmp_path):
+@pytest.mark.parametrize(
+    "changes",
+    [
+        "[]", "3", "{}", {"env_id": "CartPole-v1"}, {"env_id": 3}, {"seed": -1}, {"seed": 0.0}, {"seed": True}, {"seed": 5},
+        {"episodes": 0}, {"episodes": "4"}, {"threads": 0}, {"threads": 1.5}, {"checkpoint_seconds": -1.0},
+        {"checkpoint_seconds": "soon"}, {"tensorboard": 1}, {"algorithm": "dqn"}, {"algorithm": ["ppo"]}, {"algorithm": "sac"},
+        {"options": []}, {"options": {"horizon": -1.0}}, {"options": {"made_up": 1}}, {"settings": []}, {"settings": {}},
+        {"walkers_seed": 1}, {"evaluation_seed": None},
+    ],
+)  # fmt: skip
+def test_a_damaged_run_is_refused(tmp_path, changes):
     folder = new_run(tiny_training(), tmp_path)
-    (folder / "run.json").write_text("[]")
+    file = folder / "run.json"
+    text = (
+        changes if isinstance(changes, str) else json.dumps(json.loads(file.read_text()) | changes)
+    )
+    file.write_text(text)
     with pytest.raises(ValueError, match="is not a run's"):
         read_run(folder)
+
+
+def test_a_run_keeps_its_options_and_its_agent_is_evaluated_under_any_others(tmp_path):
+    options = EnvOptions(random_body="training", hidden_rates=True, horizon=15.0)
+    arguments = ["--steps", "128", "--episodes", "2", "--out", str(tmp_path)]
+    given = ["random_body=training", "hidden_rates=true", "horizon=15"]
+    arguments += [word for each in given for word in ("--option", each)]
+    result = CliRunner().invoke(train.app, arguments, env={"COLUMNS": "200"})
+    assert result.exit_code == 0, result.output
+    (folder,) = (path.parent for path in tmp_path.glob("*/run.json"))
+    assert read_run(folder).options == options == load(folder).card.options
+    returns = []
+    for others in ([], ["--option", "sensor_noise=0.2"]):
+        command = ["evaluate", "--agent-path", str(folder), "--episodes", "2", "--json", *others]
+        evaluated = CliRunner().invoke(agents_app, command)
+        assert evaluated.exit_code == 0, evaluated.output
+        rows = json.loads(evaluated.stdout)
+        returns += [row["mean"] for row in rows if (row["agent"], row["metric"]) == ("ppo", "return")]  # fmt: skip
+        # the folder stands for its own algorithm; the others are the package's
+        assert {row["agent"]: row["trainings"] for row in rows}.items() >= {
+            "ppo": 1,
+            "apg": 5,
+        }.items()
+    assert len(returns) == 2 and returns[0] != returns[1]
+    with pytest.raises(ValueError, match="must be the environment's own"):
+        ship(folder)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("steps", 0), ("steps", "many"), ("walkers", 1.5), ("learning_rate", None), ("hidden", 8), ("hidden", [8, "8"]),
+        ("hidden", [8.5]), ("hidden", [True]), ("batch_size", []), ("gae_lambda", "0.9"), ("push_level", "x"), ("time_constant", -1.0),
+        ("made_up", 1), ("typical_discount", 0.5), ("steps.real", 3),
+    ],
+)  # fmt: skip
+def test_a_run_with_damaged_settings_is_refused(tmp_path, name, value):
+    folder = new_run(tiny_training(), tmp_path)
+    record = json.loads((folder / "run.json").read_text())
+    record["settings"][name] = value
+    (folder / "run.json").write_text(json.dumps(record))
+    with pytest.raises(ValueError, match="is not a run's"):
+        read_run(folder)
+
+
+DAMAGES = {
+    "steps beyond the plan": ("steps", lambda a: a + 10**6),
+    "steps below zero": ("steps", lambda a: a * 0 - 1),
+    "steps that are no number": ("steps", lambda a: np.zeros(2)),
+    "NaN weights": ("policy/action_net.bias", lambda a: a * np.nan),
+    "NaN memories": ("walkers/episode_returns", lambda a: a * np.nan),
+    "weights of another type": ("policy/action_net.bias", lambda a: a.astype(float)),
+    "a negative variance": ("observations/var", lambda a: a - 100.0),
+    "statistics of another shape": ("observations/mean", lambda a: a[:3]),
+    "random numbers of another generator": ("torch", lambda a: a[:100]),
+    "a position beyond the generator's": ("numpy/state/pos", lambda a: a + 10**6),
+    "observations of another shape": ("last/observations", lambda a: a[:, :3]),
+    "an optimiser of another shape": ("adam/0/exp_avg", lambda a: a[:1]),
+    "episodes without order": ("log/steps", lambda a: a[::-1].copy()),
+    "NaN returns": ("log/returns", lambda a: a * np.nan),
+    "episodes of no length": ("log/lengths", lambda a: a * 0),
+    "columns of different lengths": ("log/survived", lambda a: a[1:]),
+    "negative seconds": ("log/seconds", lambda a: a - 1e9),
+    "no steps": ("steps", None),
+    "no walkers": ("walkers/episode_lengths", None),
+}
+
+
+def damage(file: Path, name: str, change) -> None:
+    arrays = safetensors.numpy.load(file.read_bytes())
+    value = arrays.pop(name)
+    if change is not None:
+        arrays[name] = np.asarray(change(value))
+    file.write_bytes(safetensors.numpy.save(arrays))
+
+
+@pytest.fixture(scope="module")
+def half_trained(tmp_path_factory):
+    """A run that was interrupted after its third update."""
+    folder = new_run(tiny_training(), tmp_path_factory.mktemp("runs"))
+
+    def interrupt(steps: int, recent: float) -> None:
+        if steps > 768:
+            raise Interruption
+
+    with pytest.raises(Interruption):
+        run(folder, progress=False, report=interrupt)
+    return folder
+
+
+@pytest.mark.parametrize("damaged", DAMAGES)
+def test_a_damaged_checkpoint_is_refused_whatever_is_damaged(half_trained, damaged):
+    file = half_trained / "checkpoint.safetensors"
+    sound = file.read_bytes()
+    try:
+        damage(file, *DAMAGES[damaged])
+        with pytest.raises(CheckpointError):
+            run(half_trained, progress=False)
+    finally:
+        file.write_bytes(sound)
+
+
+def test_one_broken_run_does_not_keep_others_from_being_resumed(tmp_path, capsys):
+    broken = new_run(tiny_training(), tmp_path)
+    sound = new_run(tiny_training(), tmp_path)
+    (broken / "run.json").write_text("[")
+    assert resumed("Heading", tmp_path) == sound
+    assert "left out" in capsys.readouterr().err
+
+
+def test_a_run_in_which_another_process_trains_is_refused(tmp_path):
+    folder = new_run(tiny_training(), tmp_path)
+    with locked(folder), pytest.raises(BusyError, match=f"process {os.getpid()} is at work"):
+        run(folder, progress=False)
 
 
 def test_the_command_line_trains_judges_and_is_found_by_the_evaluator(tmp_path):

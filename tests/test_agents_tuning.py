@@ -36,7 +36,7 @@ from agents.seeds import TRAINING_SEEDS
 from agents.settings import all_settings, tuned, values_of, with_values
 from agents.shipping import ship
 from agents.tuning import spaces, study
-from agents.tuning.spaces import RANGES, space_of, start_of
+from agents.tuning.spaces import RANGES, space_of
 from agents.tuning.study import FIRST_SEED, Tuning, best_trial, tune
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.files import write_json
@@ -145,7 +145,7 @@ def test_settings_of_a_learner_that_no_choice_holds_can_be_drawn(algorithm, monk
     others = replace(settings_for(algorithm, "Heading"), hidden=(24, 16))
     monkeypatch.setattr(spaces, "settings_for", lambda algorithm, task: others)
     space = space_of(algorithm, "Heading")
-    assert space.suggest(optuna.trial.FixedTrial(start_of(algorithm, others))) == others
+    assert space.suggest(optuna.trial.FixedTrial(dict(space.start))) == others
     drawn = space.suggest(optuna.create_study().ask())
     assert (drawn.steps, drawn.walkers) == (others.steps, others.walkers)
 
@@ -264,6 +264,8 @@ def test_an_interruption_loses_the_trial_under_way_only_and_not_the_first(
     assert len(complete) == 4
     values = [tuple(sorted(trial.params.items())) for trial in complete]
     assert len(set(values)) == 4  # going on draws nothing a second time
+    (unfinished,) = found.get_trials(states=(TrialState.FAIL,))
+    assert tuple(sorted(unfinished.params.items())) in values  # it is tried again
     kept = [trial.user_attrs["values"] for trial in complete]
     assert values_of(TINY) in kept  # the settings as they are
 

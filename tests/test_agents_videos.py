@@ -12,29 +12,34 @@ from typer.testing import CliRunner
 from agents import FixedController
 from agents.command_line import app
 from agents.evaluation import videos
-from agents.evaluation.videos import DIAL_RADIUS, agent_for, draw_push, film_agent, record_steps
-from agents.seeds import evaluation_seed
+from agents.evaluation.recording import record_episode
+from agents.evaluation.videos import DIAL_RADIUS, agent_for, draw_push, film_agent
+from agents.seeds import first_seed
 from lean_yaw_env.envs.walker_env import WalkerEnv
 
 
 def test_the_motion_between_heel_strikes_joins_the_episodes_states():
-    steps = record_steps(FixedController(), "Slalom", seed=evaluation_seed(0), time=8.0)
+    steps = record_episode(
+        FixedController(), "Slalom", seed=first_seed("validation", 0), most_time=8.0
+    ).steps
     env = WalkerEnv("Slalom")
-    _, info = env.reset(seed=evaluation_seed(0))
+    _, info = env.reset(seed=first_seed("validation", 0))
     for step in steps:
         assert np.array_equal(step.scene.pose.state, info["state"])
-        assert step.pitch[0] == pytest.approx(info["state"][1], abs=1e-12)
+        assert step.motion.pose(0.0).state[1] == pytest.approx(info["state"][1], abs=1e-12)
         assert step.push is None or np.isfinite(step.push).all()
         _, _, _, _, info = env.step(np.zeros(2, dtype=np.float32))
         assert step.end == pytest.approx(info["time"], rel=1e-12)
     assert steps[-2].end < 8.0 <= steps[-1].end
     # the path within a step ends where the next one's begins: the hips do not jump at heel strike
     for before, after in pairwise(steps):
-        assert np.allclose(before.centre[-1], after.centre[0], atol=1e-6)
+        assert np.allclose(before.motion.path()[-1], after.motion.path()[0], atol=1e-6)
 
 
 def test_pushes_are_told_in_standard_deviations_of_the_task():
-    steps = record_steps(FixedController(), "Push", seed=evaluation_seed(1), time=12.0)
+    steps = record_episode(
+        FixedController(), "Push", seed=first_seed("validation", 1), most_time=12.0
+    ).steps
     sizes = np.array([step.push for step in steps[1:]])
     assert 0.1 < np.abs(sizes).mean() < 2.0  # 0.8 of normal numbers, of some ten here
 
@@ -54,9 +59,9 @@ def test_a_push_is_drawn_on_its_dial_only_and_no_push_leaves_the_frame_alone():
     drawn = draw_push(frame, (-2.0, 0.0))
     changed = np.argwhere((drawn != frame).any(axis=-1))
     assert len(changed) > 100 and (frame == 200).all()
-    assert np.abs(changed[:, 1] - 240).max() <= DIAL_RADIUS + 1 and changed[:, 0].max() < 70
+    assert np.abs(changed[:, 1] - 450).max() <= DIAL_RADIUS + 1 and changed[:, 0].max() < 70
     # forward is up: the arrow fills more of the dial's upper half
-    inked = (np.abs(drawn.astype(int) - drawn[28, 240].astype(int)).sum(axis=-1) < 30)[:52, 200:280]
+    inked = (np.abs(drawn.astype(int) - drawn[28, 450].astype(int)).sum(axis=-1) < 30)[:52, 410:480]
     assert inked[:27].sum() > 2 * inked[30:].sum()
 
 

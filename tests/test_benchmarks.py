@@ -14,9 +14,15 @@ import pytest
 from benchmarks import environments, kernel, startup, training
 from benchmarks.compare import as_text as comparison_text
 from benchmarks.compare import compare, save_plot
-from benchmarks.machine import machine
-from benchmarks.measure import SMALLEST, Timings, measure
-from benchmarks.measurements import Measurement, as_json, as_text
+from benchmarks.measure import (
+    SMALLEST,
+    Measurement,
+    Timings,
+    as_json,
+    as_text,
+    machine,
+    measure,
+)
 
 REPOSITORY = Path(__file__).parents[1]
 KERNEL_KEYS = {

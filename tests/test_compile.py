@@ -17,7 +17,7 @@ from lean_yaw_env.registration import TASK_VERSIONS
 
 def test_the_command_compiles_every_function_that_python_calls() -> None:
     said: list[str] = []
-    compiling.compile_all(say=said.append)
+    compiling.compile_all(report=said.append)
     assert {line.split()[1] for line in said if line.startswith("task")} == set(TASK_VERSIONS)
     # also those of other test modules, if they ran in this process: what is theirs is not the package's
     own = [each for each in NOTICE.watched if each.__module__.startswith("lean_yaw_env.")]

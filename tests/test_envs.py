@@ -10,6 +10,7 @@ import pickle
 import subprocess
 import sys
 import warnings
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from gymnasium.wrappers import RecordVideo
 from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
 
 from lean_yaw_env import NoGaitError, Walker, WalkerParameters
+from lean_yaw_env.envs import RealTime
 from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.parameters import MIRROR, Vector
@@ -497,6 +499,119 @@ def test_frames_are_pictures_that_change_with_the_walk() -> None:
     env.close()
 
 
+def test_a_list_of_frames_shows_the_motion_within_steps_at_the_rate_it_states() -> None:
+    env = gym.make("LeanYaw/Heading-v0", render_mode="rgb_array_list")
+    env.reset(seed=1)
+    (first,) = env.render()
+    for _ in range(4):
+        *_, info = env.step(ZERO)
+    frames = env.render()
+    seconds = info["time"] / math.sqrt(9.81)  # for legs of a metre on earth
+    assert len(frames) == math.floor(seconds * env.metadata["render_fps"])
+    assert env.metadata["render_fps"] == 30
+    shown = [first, *frames]
+    assert all((one != other).any() for one, other in pairwise(shown))
+    assert env.render() == []
+    env.reset(seed=1)
+    assert np.array_equal(env.render()[0], first)
+
+
+def test_pictures_of_a_step_begin_and_end_with_those_of_its_heel_strikes() -> None:
+    env = WalkerEnv("Heading", render_mode="rgb_array")
+    env.reset(seed=1)
+    env.step(ZERO)
+    before = env.render()
+    env.step(ZERO)
+    # The same walker, footprints and path; the words are of the step's start, the new footprint comes with its end
+    assert np.mean(env.picture(0.0) != before) < 1e-3
+    assert np.mean(env.picture(1.0 - 1e-9) != env.render()) < 0.05
+    assert np.array_equal(env.picture(1.0), env.render())
+    assert np.mean(env.picture(0.5) != before) > 0.005
+
+
+def test_a_fall_is_drawn_where_the_walker_fell() -> None:
+    env = WalkerEnv("Push", render_mode="rgb_array", push_level=5.0)
+    env.reset(seed=0)
+    terminated = False
+    while not terminated:
+        *_, terminated, _, info = env.step(ZERO)
+    assert info["fall"] != FallCode.NONE
+    assert np.mean(env.picture(1.0 - 1e-9) != env.render()) < 0.02  # but for the words
+
+
+def test_in_real_time_a_step_is_a_frame_and_an_episode_the_same() -> None:
+    plain = gym.make("LeanYaw/Heading-v0", horizon=4.0)
+    expected = _episode(plain, seed=3)
+    env = RealTime(gym.make("LeanYaw/Heading-v0", render_mode="rgb_array", horizon=4.0), fps=20)
+    rng = np.random.default_rng(3)
+    seen: list[Any] = [env.reset(seed=3)]
+    ended, frames, action = False, 0, rng.uniform(-1.0, 1.0, 2).astype(np.float32)
+    while not ended:
+        result = env.step(action)
+        frames += 1
+        ended = result[2] or result[3]
+        if result[4] is not seen[-1][-1]:  # the walking step is over
+            seen.append(result)
+            action = rng.uniform(-1.0, 1.0, 2).astype(np.float32)
+        else:
+            assert result[1:4] == (0.0, False, False) and result[0] is seen[-1][0]
+    assert len(seen) == len(expected) > 4
+    for ours, theirs in zip(seen, expected, strict=True):
+        assert _same(ours[0], theirs[0]) and _same(ours[1:-1], theirs[1:-1])
+    seconds = seen[-1][-1]["time"] / math.sqrt(9.81)
+    assert frames == math.ceil(seconds * 20)
+
+
+def test_gymnasium_records_films_in_real_time(tmp_path: Path) -> None:
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the encoder's own
+        walker = gym.make("LeanYaw/Heading-v0", render_mode="rgb_array")
+        env = RecordVideo(RealTime(walker), str(tmp_path))
+        env.reset(seed=1)
+        for _ in range(40):
+            env.step(ZERO)
+        env.close()
+    (video,) = tmp_path.glob("*.mp4")
+    about = next(ffmpeg.read_frames(str(video)))
+    assert about["fps"] == 30 and about["size"] == (960, 540)
+    # the first picture, and one for each of the forty frames
+    assert ffmpeg.count_frames_and_secs(str(video))[0] == 41
+
+
+def test_gymnasiums_play_steers_by_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    import pygame
+    from gymnasium.utils.play import play
+
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    headings: list[float] = []
+
+    def after_frame(*seen: Any) -> None:
+        headings.append(float(seen[-1]["state"][0]))
+        if len(headings) == 1:
+            pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_a))
+        if len(headings) == 60:
+            pygame.event.post(pygame.event.Event(pygame.QUIT))
+
+    walker = gym.make(
+        "LeanYaw/Heading-v0", render_mode="rgb_array", mirror=False, start_disturbance=0.0
+    )
+    play(RealTime(walker, speed=4.0), callback=after_frame, fps=1000, seed=0, noop=ZERO)
+    assert len(headings) == 60
+    assert headings[-1] > headings[0] + 0.1  # to the left
+
+
+def test_real_time_is_for_walkers_that_can_be_drawn() -> None:
+    with pytest.raises(ValueError, match='render_mode="rgb_array"'):
+        RealTime(gym.make("LeanYaw/Walk-v0"))
+    with pytest.raises(ValueError, match="must be an environment of lean_yaw_env"):
+        RealTime(gym.make("CartPole-v1"))
+    drawn = gym.make("LeanYaw/Walk-v0", render_mode="rgb_array")
+    for change in ({"fps": 0}, {"speed": 0.0}):
+        with pytest.raises(ValueError, match="must be"):
+            RealTime(drawn, **change)
+
+
 def test_an_environment_without_pictures_says_how_to_get_them() -> None:
     env = WalkerEnv("Walk")
     env.reset(seed=1)
@@ -528,8 +643,6 @@ def test_keys_cover_what_can_be_held_and_steer_to_their_side() -> None:
     "name", ["TimeAwareObservation", "NumpyToTorch", "RecordEpisodeStatistics"]
 )
 def test_gymnasium_s_wrappers_take_it(name: str) -> None:
-    if name == "NumpyToTorch":
-        pytest.importorskip("array_api_compat")
     env = getattr(gym.wrappers, name)(gym.make("LeanYaw/Push-v0", max_episode_steps=5))
     env.reset(seed=1)
     zero = env.unwrapped.action_space.sample() * 0
@@ -546,7 +659,10 @@ def test_gymnasium_s_wrappers_take_it(name: str) -> None:
     ("options", "message"),
     [
         ({"task": "Fly"}, "task must be one of .*Heading.*, got 'Fly'"),
-        ({"render_mode": "ansi"}, "render_mode must be one of rgb_array, human, got 'ansi'"),
+        (
+            {"render_mode": "ansi"},
+            "render_mode must be one of rgb_array, rgb_array_list, human, got 'ansi'",
+        ),
         ({"parameters": 0.1}, "parameters must be WalkerParameters or a mapping .*, got 0.1"),
         ({"parameters": {"slop": 0.1}}, "parameters has no 'slop'; did you mean 'slope'"),
         ({"parameters": {"slope": 1.0}}, r"slope must be in \[-0.5, 0.5\], got 1.0"),
@@ -564,9 +680,9 @@ def test_a_bad_option_is_refused_by_name(options: dict[str, Any], message: str) 
 
 
 def test_an_unknown_option_is_refused() -> None:
-    with pytest.raises(TypeError, match="option 'wind' is unknown"):
+    with pytest.raises(TypeError, match="unexpected keyword argument 'wind'"):
         WalkerEnv("Walk", wind=1.0)
-    with pytest.raises(TypeError, match="option 'slop' is unknown; did you mean 'slope'"):
+    with pytest.raises(TypeError, match="unexpected keyword argument 'slop'; did you mean 'slope'"):
         WalkerEnv("Walk", slop=0.01)
 
 
@@ -580,7 +696,7 @@ def test_a_walker_without_a_gait_makes_no_environment() -> None:
     [
         ([0.0], r"action must have shape \(2,\), got \(1,\)"),
         ([[0.0, 0.0]], r"action must have shape \(2,\), got \(1, 2\)"),
-        (0.0, r"action must have shape \(2,\), got \(\)"),
+        (0.0, r"action must have shape \(2,\), got 0.0"),
         ([math.nan, 0.0], r"action must be numbers in \[-1, 1\], got \[nan, 0.0\]"),
         ([0.0, -math.inf], "action must be numbers"),
     ],

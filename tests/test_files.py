@@ -9,7 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from lean_yaw_env.files import require_ending, write_text, written_whole
+from lean_yaw_env.files import (
+    BusyError,
+    locked,
+    read_json,
+    read_regular,
+    require_ending,
+    write_text,
+    written_whole,
+)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX modes")
@@ -64,14 +72,68 @@ def test_what_a_killed_process_left_is_removed_by_the_next_write(tmp_path: Path)
         "    temporary.write_text('half')\n"
         "    os._exit(1)\n"
     )
-    for left in (path, other):
-        subprocess.run([sys.executable, "-c", killed, str(left)], check=False)
-    assert len(list(tmp_path.iterdir())) == 2
-    write_text(path, "whole")
-    # The other file's remains wait for the next write of that file
-    assert len(list(tmp_path.iterdir())) == 2
-    write_text(other, "whole")
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["kept.txt", "other.txt"]
+    subprocess.run([sys.executable, "-c", killed, str(other)], check=False)
+    assert len(list(tmp_path.iterdir())) == 1
+    write_text(path, "whole")  # removes what is left of the other file too
+    assert [file.name for file in tmp_path.iterdir()] == ["kept.txt"]
+
+
+def test_a_partial_file_of_another_machine_is_removed_after_a_day_only(tmp_path: Path) -> None:
+    left = tmp_path / ".partial-1-00000000-another.txt"
+    left.write_text("half")
+    write_text(tmp_path / "new.txt", "")
+    assert left.exists()
+    os.utime(left, (0.0, 0.0))
+    write_text(tmp_path / "new.txt", "")
+    assert not left.exists()
+
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from lean_yaw_env.files import locked
+with locked(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60.0)
+"""
+
+
+def test_a_second_process_is_refused_by_the_first_one_s_id_until_the_first_is_killed(
+    tmp_path: Path,
+) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(tmp_path)], stdout=subprocess.PIPE
+    ) as holder:
+        assert holder.stdout is not None and holder.stdout.readline()
+        with (
+            pytest.raises(BusyError, match=f"process {holder.pid} is at work in"),
+            locked(tmp_path),
+        ):
+            pass
+        holder.kill()
+    with locked(tmp_path):
+        pass
+    with locked(tmp_path):
+        pass
+    assert not list(tmp_path.iterdir())
+
+
+def test_only_regular_files_of_moderate_size_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "file.json"
+    path.write_text("[1]")
+    assert read_json(path) == [1]
+    with pytest.raises(OSError, match="has 3 bytes, and at most 2 are read"):
+        read_regular(path, 2)
+    for other in (tmp_path, Path("/dev/zero"), make_pipe(tmp_path / "pipe")):
+        if other.exists():
+            with pytest.raises(ValueError, match="is not a regular file"):
+                read_json(other)
+
+
+def make_pipe(path: Path) -> Path:
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(path)
+    return path
 
 
 def test_a_write_leaves_the_unfinished_one_of_a_running_process_alone(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from lean_yaw_env.envs.goal_env import (
 )
 from lean_yaw_env.envs.hindsight import GoalFromWalker, HindsightReplay
 from lean_yaw_env.envs.sb3 import WalkerVecEnv
-from lean_yaw_env.envs.tasks.waypoint import RADIUS
+from lean_yaw_env.envs.tasks.waypoints import RADIUS
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.registration import GOAL_ENV_ID
 

@@ -99,6 +99,13 @@ def test_the_two_searches_agree(cycle: LimitCycle) -> None:
     assert np.abs(find_gait(Walker()) - cycle.state).max() < 1e-10
 
 
+@pytest.mark.parametrize("slope", [0.008, 0.009])
+def test_the_gait_alone_is_found_where_estimated_slopes_lead_nowhere(slope):
+    walker = Walker(WalkerParameters(slope=slope))
+    # both have the residual of a found gait, 1e-10, over multipliers that leave 0.1 of a deviation or more
+    assert find_gait(walker) == pytest.approx(find_limit_cycle(walker).state, abs=1e-9)
+
+
 def test_turns_to_either_side_are_mirror_images() -> None:
     walker = Walker(WalkerParameters(slope_turns=True))
     right, left = (find_limit_cycle(walker, mass_offset=offset) for offset in (0.05, -0.05))

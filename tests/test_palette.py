@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from lean_yaw_env.rendering import palette
 from lean_yaw_env.rendering.palette import (
     AGENT_COLOURS,
     FOOT_COLOURS,
@@ -72,3 +75,13 @@ def test_any_two_colours_are_told_apart(colours: tuple[Colour, ...], sight: np.n
     ]
     # A difference of 2.3 is just noticeable side by side (Mahy et al. 1994); thin lines apart need several times that
     assert min(distances) > 15.0
+
+
+def test_the_page_has_the_colours_of_pictures_and_films() -> None:
+    source = Path(__file__).parents[1] / "web" / "src" / "scene" / "palette.ts"
+    page = dict(re.findall(r"(\w+): \"(#[0-9a-f]{6})\"", source.read_text(encoding="utf-8")))
+    others = {"faint": "FAINT_INK", "axis": "ANKLE_AXIS"}
+    assert len(page) >= 15
+    for name, colour in page.items():
+        ours = getattr(palette, others.get(name, name.upper()))
+        assert colour == "#{:02x}{:02x}{:02x}".format(*ours), name

@@ -5,36 +5,27 @@ from __future__ import annotations
 import csv
 import math
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 
-from lean_yaw_env.paper import (
-    CLASSICS,
-    NAMES,
-    PAPER,
-    PIECES,
-    Check,
-    PaperNumber,
-    Piece,
+from lean_yaw_env.paper import report
+from lean_yaw_env.paper.checks import Check, Printed, Result, Section, assess, compare
+from lean_yaw_env.paper.registry import CLASSICS, NAMES, PAPER, PIECES, Piece, pieces_named
+from lean_yaw_env.paper.report import (
     Reproduced,
     Reproduction,
-    Result,
-    Section,
-    Statement,
     as_html,
     as_markdown,
-    compare,
-    judge,
-    pieces_named,
     reproduce,
+    write_columns,
     write_report,
 )
-from lean_yaw_env.paper.reproduction import write_columns
 
-_NUMBER = PaperNumber("speed", "0.36", "Figure 13", "critical speed")
-_STATEMENT = Statement("basin", "large", "section 4.1", "basin of attraction")
+_NUMBER = Printed("speed", "0.36", "Figure 13", "critical speed")
+_STATEMENT = Printed("basin", "large", "section 4.1", "basin of attraction")
 
 
 class _Page(HTMLParser):
@@ -77,7 +68,7 @@ def test_a_number_agrees_within_half_a_unit_of_its_last_printed_digit(
 
 
 def test_an_approximate_number_agrees_within_its_stated_room_and_says_so() -> None:
-    about = PaperNumber("x", "0.72", "Figure 13", "critical speed", 0.02, "read off a figure")
+    about = Printed("x", "0.72", "Figure 13", "critical speed", 0.02, "read off a figure")
     check = compare(about, 0.705)
     assert check.verdict == "agrees"
     assert check.allowed == "± 0.02: read off a figure"
@@ -85,34 +76,36 @@ def test_an_approximate_number_agrees_within_its_stated_room_and_says_so() -> No
 
 
 def test_a_tolerance_of_its_own_leaves_a_number_no_room_from_its_digits() -> None:
-    ratio = PaperNumber("ratio", "1", "section 4.3", "ratio", 0.1, "one of four data points")
+    ratio = Printed("ratio", "1", "section 4.3", "ratio", 0.1, "one of four data points")
     assert compare(ratio, 0.93).verdict == "agrees"
     assert compare(ratio, 0.54).verdict == "differs"
     # A printed 0 among values of two decimals is no 0.4
-    zero = PaperNumber("λ3", "0", "Table 3", "zero", 0.005, "the others have two decimals")
+    zero = Printed("λ3", "0", "Table 3", "zero", 0.005, "the others have two decimals")
     assert compare(zero, 0.4).verdict == "differs"
-    assert compare(PaperNumber("r", "0.5", "Table 1", "r", 0.0, "exact"), 0.5).verdict == "agrees"
+    assert compare(Printed("r", "0.5", "Table 1", "r", 0.0, "exact"), 0.5).verdict == "agrees"
 
 
 def test_a_tolerance_needs_a_reason_and_a_reason_a_tolerance() -> None:
     for tolerance, reason in ((0.1, ""), (None, "about")):
         with pytest.raises(ValueError, match="speed"):
-            PaperNumber("speed", "1", "here", "speed", tolerance, reason)
+            compare(Printed("speed", "1", "here", "speed", tolerance, reason), 1.0)
 
 
 def test_every_disagreement_says_something() -> None:
     assert "0.36" in compare(_NUMBER, 0.5).remark
-    assert compare(_NUMBER, 0.5, is_open=True).verdict == "open"
+    assert compare(replace(_NUMBER, is_open=True), 0.5).verdict == "open"
+    assert assess(_STATEMENT, False, "small").remark == "It does not hold."
+    assert compare(replace(_NUMBER, remark="A", otherwise="B."), 0.5).remark == "A B."
     with pytest.raises(ValueError, match="basin"):
-        judge(_STATEMENT, False, ours="small")
+        Check("basin", "b", "c", "d", "e", None, "f", "differs")
     with pytest.raises(ValueError, match="verdict must be one of"):
         Check("a", "b", "c", "d", "e", None, "f", "agrees a bit")  # pyright: ignore[reportArgumentType]
 
 
 def test_ours_is_shown_with_two_digits_more_than_the_paper() -> None:
     assert compare(_NUMBER, 0.3638912).ours == "0.3639"
-    assert compare(PaperNumber("z", "0", "Table 3", "zero"), 3e-17).ours == "0"
-    assert compare(PaperNumber("z", "0", "Table 3", "small"), 3.1e-4).ours == "3.1e-04"
+    assert compare(Printed("z", "0", "Table 3", "zero"), 3e-17).ours == "0"
+    assert compare(Printed("z", "0", "Table 3", "small"), 3.1e-4).ours == "3.1e-04"
 
 
 def test_pieces_are_unique_complete_and_in_the_papers_order() -> None:
@@ -153,8 +146,8 @@ def _sample(tmp_path: Path) -> Reproduction:
     picture = tmp_path / "one.png"
     picture.write_bytes(b"\x89PNG")
     checks = (
-        compare(_NUMBER, 0.5, unless="5 < 6 & |λ| differ"),
-        judge(_STATEMENT, True, ours="large"),
+        compare(_NUMBER, 0.5, otherwise="5 < 6 & |λ| differ"),
+        assess(_STATEMENT, True, "large"),
     )
     piece = Piece("one", "The <first>", lambda: Result(checks))
     section = Section("What was <tried>", "Nothing helped.", {"tried": ["r | α"], "λ": ["0.5"]})
@@ -200,7 +193,38 @@ def test_a_reproduction_leaves_report_pictures_and_numbers_and_no_scraps(tmp_pat
         "checks.csv",
         "report.md",
         "report.html",
+        ".finished",
     }
     with (tmp_path / "checks.csv").open(encoding="utf-8") as file:
         assert len(list(csv.DictReader(file))) == len(done.checks)
     assert sum(done.counts().values()) == len(done.checks)
+
+
+def test_a_reproduction_goes_on_where_it_was_and_gives_the_same_report(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+
+    def piece(name: str) -> Piece:
+        def make() -> Result:
+            if made == ["first"] and name == "second":
+                made.append("interruption")
+                raise KeyboardInterrupt
+            made.append(name)
+            return Result((assess(_STATEMENT, True, "large"),), {name: {"a": [1]}})
+
+        return Piece(name, name, make)
+
+    monkeypatch.setattr(report, "pieces_named", lambda names: (piece("first"), piece("second")))
+    with pytest.raises(KeyboardInterrupt):
+        reproduce([], tmp_path)
+    texts = [as_markdown(reproduce([], tmp_path)) for _ in range(2)]
+    assert made == ["first", "interruption", "second"]
+    assert texts[0] == texts[1]
+    (tmp_path / "first.csv").unlink()
+    (tmp_path / ".finished" / "second.json").write_text("{")
+    assert as_markdown(reproduce([], tmp_path)) == texts[0]
+    assert made[3:] == ["first", "second"]  # what is missing or damaged is computed again
+    monkeypatch.setattr(report, "_code_digest", lambda: "another")
+    reproduce([], tmp_path)
+    assert made[5:] == ["first", "second"]

@@ -13,12 +13,8 @@ from lean_yaw_env.kernel.passive import INPUTS, PassiveOutcome, passive_batch, p
 from lean_yaw_env.kernel.records import FAILED, STEPPED, Body
 from lean_yaw_env.multibody import MultibodyWalker
 from lean_yaw_env.parameters import WalkerParameters
-from lean_yaw_env.passive import (
-    PASSIVE_MIRROR,
-    PassiveFall,
-    PassiveWalker,
-    step_passive_rows,
-)
+from lean_yaw_env.passive import PASSIVE_MIRROR, PassiveWalker, step_passive_rows
+from lean_yaw_env.walker import Fall
 from tests.reference import TINY, ReferenceWalker, Y, Z, rotation
 
 POINT_FEET = PassiveWalker(WalkerParameters(0.0, 0.0, 0.5, 0.004), planar=True)
@@ -125,11 +121,11 @@ def test_both_feet_are_on_the_floor_at_either_end_of_a_step() -> None:
 
 def test_gravity_pays_for_the_strike_and_nothing_is_lost_between() -> None:
     step = WIDE.step(UNEVEN)
-    assert abs(step.ankle_loss) < 1e-10  # no spring, no damper: the integrator's drift
+    assert abs(step.energy.ankle_loss) < 1e-10  # no spring, no damper: the integrator's drift
     gait = find_limit_cycle(FLAT)
     on_gait = FLAT.step(gait.state)
     # at the fixed point to 1e-12, with rates below one
-    assert on_gait.gravity_work == pytest.approx(on_gait.impact_loss, abs=1e-11)
+    assert on_gait.energy.gravity_work == pytest.approx(on_gait.energy.impact_loss, abs=1e-11)
 
 
 def test_right_step_mirrors_left_step() -> None:
@@ -345,21 +341,21 @@ def test_a_walker_that_has_tipped_over_does_not_land_on_a_leg_that_has_swung_rou
     # the foot rolls on, held to the floor by a normal force of half a weight, until the leg is level
     walker = PassiveWalker(WalkerParameters(0.0725, 0.45, 1.15, 0.0039))
     fall = walker.step([0.0, 0.226, -0.001, -0.276, 0.0, -0.018])
-    assert fall.fall is PassiveFall.FORWARD
+    assert fall.fall is Fall.FORWARD
     assert fall.least_normal_force > 0.5
     assert -1.7 < fall.state[1] <= -0.5 * np.pi
 
 
 def test_slow_walker_falls_backward_and_fast_one_lifts_off() -> None:
     gait = find_limit_cycle(POINT_FEET).state
-    assert POINT_FEET.step(gait * [1, 1, 1, 0.5, 1, 1]).fall is PassiveFall.BACKWARD
-    assert POINT_FEET.step(gait * [1, 1, 1, 9.0, 1, 1]).fall is PassiveFall.LIFT_OFF
+    assert POINT_FEET.step(gait * [1, 1, 1, 0.5, 1, 1]).fall is Fall.BACKWARD
+    assert POINT_FEET.step(gait * [1, 1, 1, 9.0, 1, 1]).fall is Fall.LIFT_OFF
 
 
 def test_walker_too_fast_for_its_swing_leg_falls_forward() -> None:
     gait = find_limit_cycle(POINT_FEET).state
     fall = POINT_FEET.step(gait * [1, 1, 1, 1.5, 1, 1])
-    assert fall.fall is PassiveFall.FORWARD
+    assert fall.fall is Fall.FORWARD
     assert fall.state[1] < 0.0
 
 

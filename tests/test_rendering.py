@@ -28,9 +28,18 @@ from lean_yaw_env.rendering import (
     status_lines,
     walker_shape,
 )
-from lean_yaw_env.rendering.camera import Panel, body_camera, floor_camera, upward
+from lean_yaw_env.rendering.camera import Panel, floor_camera, perspective_camera, upward
 from lean_yaw_env.rendering.footprints import footprint_length, footprint_outlines
-from lean_yaw_env.rendering.palette import COMMAND, FOOT_COLOURS, GOAL, INK, LEFT, REFERENCE, RIGHT
+from lean_yaw_env.rendering.palette import (
+    COMMAND,
+    FLOOR,
+    FOOT_COLOURS,
+    GOAL,
+    INK,
+    LEFT,
+    REFERENCE,
+    RIGHT,
+)
 from lean_yaw_env.rendering.picture import footprint_figure
 from lean_yaw_env.walker import Walker
 
@@ -281,13 +290,32 @@ def test_downhill_is_up_and_right_is_right_from_above():
 
 
 @pytest.mark.parametrize("slope", [0.2, 0.0, -0.1])
-def test_from_the_side_the_floor_falls_by_the_slope(slope):
+def test_in_perspective_plumb_lines_are_upright_and_what_is_twice_as_far_is_half_as_large(slope):
     up = upward(WalkerParameters(slope=slope), 0.0)
-    camera = body_camera(
-        Panel(0.0, 0.0, 1.0, 1.0), np.array([0.0, 0.0, 1.0]), up, np.zeros(3), np.zeros(2), 1.0
-    )
-    across, down = camera.pixels(np.array([1.0, 0.0, 0.0]))
-    assert math.atan2(down, across) == pytest.approx(slope, abs=ROUNDING)
+    target, panel = np.array([3.0, 0.5, -1.0]), Panel(100.0, 50.0, 300.0, 400.0)
+    eye = target + np.array([-2.0, 1.0, 1.5])
+    camera = perspective_camera(panel, eye, target, up, 0.6)
+    middle, scale = camera.place(target)
+    np.testing.assert_allclose(middle, panel.middle, atol=1e-9)  # some hundred pixels: rounding
+    # the plumb line through what is looked at
+    places, _ = camera.seen(target + np.outer([-0.4, 0.4], up))
+    assert places[0, 0] == pytest.approx(places[1, 0], abs=1e-9)
+    assert places[0, 1] > places[1, 1]
+    _, twice_as_far = camera.place(eye + 2.0 * (target - eye))
+    assert twice_as_far == pytest.approx(scale / 2.0, rel=1e-12)
+    assert np.isnan(camera.seen((eye - (target - eye))[None])[0]).all()  # behind the camera
+
+
+def test_the_floor_vanishes_at_the_horizon():
+    up = upward(WalkerParameters(slope=0.2), 0.0)
+    panel = Panel(0.0, 0.0, 300.0, 400.0)
+    camera = perspective_camera(panel, np.array([-2.0, 1.0, 1.5]), np.zeros(3), up, 0.6)
+    far = 1e9 * np.column_stack([np.cos([0.3, 0.7, 1.1]), -np.sin([0.3, 0.7, 1.1]) + 0.0])
+    places = camera.on_floor(far * [1.0, -1.0])
+    left, right = camera.horizon()
+    expected = left + (right - left) * places[:, 0] / 300.0
+    # a height of one at a distance of 1e9 is less than a millionth of a pixel
+    np.testing.assert_allclose(places[:, 1], expected, atol=1e-5)
 
 
 def test_a_slope_that_turns_falls_to_where_the_walker_heads():
@@ -325,7 +353,7 @@ def test_the_stance_footprint_is_drawn_in_its_colour_and_left_is_left_of_right(w
     stance = coloured(frame, LEFT)  # four steps on, the left foot stands again
     assert len(stance) > 100
     old_right = coloured(
-        frame, tuple(round(0.6 * c + 0.4 * f) for c, f in zip(RIGHT, (250, 249, 246), strict=True))
+        frame, tuple(round(0.6 * c + 0.4 * f) for c, f in zip(RIGHT, FLOOR, strict=True))
     )
     assert len(old_right) > 200
     assert stance[:, 1].mean() < old_right[:, 1].mean()
@@ -361,14 +389,26 @@ def test_goals_and_a_reference_path_are_on_the_floor(walker, renderer):
     assert rings[:, 1].mean() > line[:, 1].mean()
 
 
-def test_both_legs_stand_on_the_floor_in_the_side_view(walker, renderer):
-    side = renderer.frame(scene_of(walker, 1))[:240, 568:]  # without the legend below
-    near = coloured(side, FOOT_COLOURS["right"])  # seen from the right
-    masses = coloured(side, INK)
-    assert len(near) > 300
-    height = near[:, 0].max() - masses[:, 0].mean()
-    # a leg length at the view's scale of 175 pixels, less the legs' slant, with half a mass and a rim
-    assert 160 <= height <= 190
+def test_legs_stand_under_their_masses_in_perspective_and_the_left_one_is_left(walker, renderer):
+    view = renderer.frame(scene_of(walker, 1))[:510, 568:]  # without the legend below
+    left, right = coloured(view, FOOT_COLOURS["left"]), coloured(view, FOOT_COLOURS["right"])
+    masses = coloured(view, INK)
+    assert min(len(left), len(right), len(masses)) > 300
+    assert left[:, 1].mean() < right[:, 1].mean()
+    for leg in (left, right):
+        # two thirds of the way up, at least, from the foot to the masses
+        assert leg[:, 0].max() > masses[:, 0].max() + 100
+    assert masses[:, 0].max() < view.shape[0] / 2
+
+
+def test_commands_and_goals_lie_on_the_floor_in_perspective_too(walker, renderer):
+    plain = renderer.frame(scene_of(walker, 4))[:, 568:]
+    frame = renderer.frame(scene_of(walker, 4, commanded_heading=0.3, goals=[Goal(3.5, 0.0, 0.3)]))[
+        :, 568:
+    ]
+    for colour in (COMMAND, GOAL):
+        assert len(coloured(plain, colour)) == 0
+        assert len(coloured(frame, colour)) > 20
 
 
 def test_a_walk_longer_than_the_panel_shows_is_seen_whole_in_an_inset(walker, renderer):
@@ -705,7 +745,7 @@ def test_a_pose_names_what_is_wrong_with_it(change, message):
     ("change", "message"),
     [
         ({"parameters": None}, "parameters must be WalkerParameters"),
-        ({"pose": GAIT}, "pose must be a Pose"),
+        ({"pose": GAIT}, "pose must be Pose"),
         ({"footprints": np.zeros((2, 3))}, r"footprints must have shape \(n, 2\), got \(2, 3\)"),
         ({"footprints": np.zeros((2, 2))}, r"headings must have shape \(2,\), got \(0,\)"),
         ({"feet": ["left"]}, "feet must hold 0, one per footprint, got 1"),

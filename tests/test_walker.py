@@ -217,7 +217,7 @@ def test_a_step_does_not_change_its_arguments(gait: Vector) -> None:
 
 def test_falls_compare_with_their_names() -> None:
     assert {fall.value for fall in Fall} == {
-        "backward", "sideways", "trip", "lift-off", "slip", "no-heel-strike"
+        "backward", "forward", "sideways", "trip", "lift-off", "slip", "no-heel-strike"
     }  # fmt: skip
     assert Fall.LIFT_OFF == "lift-off"
     assert all(isinstance(Fall(fall.value), Fall) for fall in Fall)

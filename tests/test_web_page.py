@@ -405,6 +405,20 @@ def test_saved_walk_is_walked_on_the_page_with_the_same_bits(browser, tmp_path):
     assert fall == walk.fall.value
 
 
+def test_walk_in_a_notebook_is_walked_with_the_same_bits_without_any_server(browser, tmp_path):
+    walk = Walker().walk(4, state=[0.0, 0.155, -0.004, -0.42, -0.07], mass_offset=0.006)
+    cell = tmp_path / "cell.html"
+    cell.write_text(f"<!doctype html><p>A cell.</p>{walk.show()._repr_html_()}", encoding="utf-8")
+    page = browser.new_page()
+    page.set_default_timeout(PATIENCE)
+    page.goto(cell.as_uri())
+    frame = page.frames[-1]
+    frame.wait_for_function("window.leanYaw && leanYaw.active().walk.records.length > 2")
+    states = frame.evaluate("leanYaw.active().walk.records.map(record => [...record.state])")
+    assert np.array_equal(np.array(states)[:3, :5], walk.states[:3])
+    page.close()
+
+
 def test_file_that_is_no_walk_is_refused_in_words(visit, tmp_path):
     page = visit()
     (tmp_path / "other.json").write_text('{"format": "something else"}')

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
+import html
 import json
 import re
 import urllib.error
@@ -10,7 +13,9 @@ import urllib.request
 import numpy as np
 import pytest
 
-from lean_yaw_env import Walker, WalkerParameters
+from lean_yaw_env import Walker, WalkerParameters, find_limit_cycle
+from lean_yaw_env.analysis import find_passive_gaits
+from lean_yaw_env.passive import PassiveWalker
 from lean_yaw_env.viewer import PAGE, PageServer
 
 
@@ -80,3 +85,44 @@ def test_walk_is_saved_as_json_only(tmp_path):
     walk = Walker(WalkerParameters()).walk(1, state=[0.0, 0.155, -0.004, -0.42, -0.07])
     with pytest.raises(ValueError, match=r"must end with one of \.json"):
         walk.save(tmp_path / "walk.csv")
+
+
+def unpacked(packed):
+    return gzip.decompress(base64.b64decode(packed))
+
+
+def test_a_walk_in_a_notebook_is_one_document_with_the_whole_page_in_it():
+    walk = Walker().walk(3, state=[0.0, 0.155, -0.004, -0.42, -0.07])
+    shown = walk.show(height=500)._repr_html_()
+    assert shown.startswith("<iframe srcdoc=") and 'height="500"' in shown
+    document = html.unescape(re.search(r'srcdoc="([^"]*)"', shown)[1])
+    files = json.loads(re.search(r"of (\[\[.*?\]\])\) {", document)[1])
+    assert {name for name, _, _ in files} == {path.name for path in (PAGE / "assets").iterdir()}
+    contents = {name: unpacked(packed) for name, _, packed in files}
+    for name, content in contents.items():
+        assert content == (PAGE / "assets" / name).read_bytes()
+    page = unpacked(re.search(r'unpacked\("([^"]*)"\)', document)[1]).decode()
+    assert page == (PAGE / "index.html").read_text(encoding="utf-8")
+    saved = json.loads(re.search(r"\.open\((\{.*?\})\s*\);", document, re.DOTALL)[1])
+    assert saved["states"] == walk.states.tolist()
+    # What names another file does so in a way that the document knows, and is unpacked after it
+    texts = [content.decode() for name, content in contents.items() if not name.endswith(".wasm")]
+    for k, name in enumerate(contents):
+        names = [f"new URL(`{name}`,import.meta.url).href", f"./assets/{name}"]
+        users = [text for text in (*texts, page) if name in text]
+        assert users and all(any(way in text for way in names) for text in users)
+        earlier = [content for content in list(contents.values())[: k + 1]]
+        assert not any(name.encode() in content for content in earlier)
+
+
+def test_a_gait_is_shown_as_a_walk_of_it_and_a_passive_one_is_refused():
+    gait = find_limit_cycle(Walker())
+    saved = json.loads(gait.show(n_steps=5).walk)
+    assert len(saved["inter_leg_angles"]) == 5
+    # the gait recurs to its residual, about 1e-12, grown over five steps
+    np.testing.assert_allclose(saved["states"][4], gait.state, atol=1e-10)
+    passive = find_passive_gaits(
+        PassiveWalker(WalkerParameters(hip_width=0.0, foot_radius=0.0, slope=0.009), planar=True)
+    )
+    with pytest.raises(ValueError, match="only a Walker's gait can be shown"):
+        passive[0].show()

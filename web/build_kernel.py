@@ -25,7 +25,7 @@ KERNEL = WEB.parent / "lean_yaw_env" / "kernel"
 MODULE = WEB / "src" / "kernel" / "kernel.wasm"
 LAYOUT = WEB / "src" / "kernel" / "layout.ts"
 VEHICLES = WEB / "src" / "physics" / "vehicle_data.ts"
-_SECTION = "sources"  # the custom section with the digest
+_SECTION, _DIGEST_SIZE = "sources", 64  # the custom section with the digest
 
 # Code for no processor in particular, and one number at a time: WebAssembly takes what is left
 _NUMBA = {
@@ -73,35 +73,14 @@ def digest_of_sources() -> str:
 
 
 def digest_in(module: bytes) -> str:
-    """The digest that a module carries; empty if it has none."""
-    place = 8
-    while place < len(module):
-        kind, place = module[place], place + 1
-        size, place = _number_at(module, place)
-        end = place + size
-        if kind == 0:
-            length, place = _number_at(module, place)
-            if module[place : place + length] == _SECTION.encode():
-                return module[place + length : end].decode()
-        place = end
-    return ""
-
-
-def _number_at(module: bytes, place: int) -> tuple[int, int]:
-    """A number in LEB128 and the place after it."""
-    value, shift = 0, 0
-    while True:
-        byte = module[place]
-        value |= (byte & 0x7F) << shift
-        place, shift = place + 1, shift + 7
-        if byte < 0x80:
-            return value, place
+    """The digest that a module carries, in a custom section at its end; empty if it has none."""
+    end = module[-len(_SECTION) - _DIGEST_SIZE :].decode("ascii", "replace")
+    return end.removeprefix(_SECTION) if end.startswith(_SECTION) else ""
 
 
 def _with_digest(module: bytes, digest: str) -> bytes:
-    name = _SECTION.encode()
-    content = bytes([len(name)]) + name + digest.encode()
-    assert len(content) < 0x80
+    content = bytes([len(_SECTION)]) + (_SECTION + digest).encode()
+    assert len(digest) == _DIGEST_SIZE and len(content) < 0x80  # one byte of a length in LEB128
     return module + bytes([0, len(content)]) + content
 
 
@@ -220,7 +199,7 @@ def layout() -> str:
 
     from lean_yaw_env.kernel import records
 
-    statuses = (
+    statuses = [
         "STEPPED",
         "BACKWARD",
         "SIDEWAYS",
@@ -229,8 +208,8 @@ def layout() -> str:
         "SLIP",
         "NO_STRIKE",
         "FAILED",
-    )
-    tables: dict[str, Any] = {
+    ]
+    tables = {
         "BODY": entries.Body._fields,
         "COMMAND": entries.Command._fields,
         "OUTCOME": entries.Outcome._fields,
@@ -238,21 +217,14 @@ def layout() -> str:
         "OUTPUTS": entries.OUTPUTS,
         "PASSIVE_OUTCOME": entries.PassiveOutcome._fields,
     }
-    numbers = {
-        "INPUTS": entries.INPUTS,
-        "STATE_SIZE": entries.STATE_SIZE,
-        "PASSIVE_INPUTS": entries.PASSIVE_INPUTS,
-        "PASSIVE_STATE_SIZE": entries.PASSIVE_STATE_SIZE,
-        "PASSIVE_COLUMNS": entries.PASSIVE_COLUMNS,
-    }
-    lines = ["// Written by build_kernel.py from the kernel's records; do not edit.", ""]
-    lines += [
-        f"export const {name} = {json.dumps(list(names))} as const;"
-        for name, names in tables.items()
-    ]
-    lines += [f"export const {name} = {value};" for name, value in numbers.items()]
+    numbers = ["INPUTS", "STATE_SIZE", "PASSIVE_INPUTS", "PASSIVE_STATE_SIZE", "PASSIVE_COLUMNS"]
     named = ", ".join(f"{name}: {getattr(records, name):g}" for name in statuses)
-    return "\n".join([*lines, f"export const STATUS = {{ {named} }} as const;", ""])
+    return "\n".join([
+        "// Written by build_kernel.py from the kernel's records; do not edit.", "",
+        *(f"export const {name} = {json.dumps(list(names))} as const;" for name, names in tables.items()),
+        *(f"export const {name} = {getattr(entries, name)};" for name in numbers),
+        f"export const STATUS = {{ {named} }} as const;", "",
+    ])  # fmt: skip
 
 
 def vehicles() -> str:
@@ -264,14 +236,10 @@ def vehicles() -> str:
         "BENCHMARK_BICYCLE": asdict(BENCHMARK_2007),
         "SKATEBOARD": asdict(Skateboard()),
     }
-    lines = [
-        "// Written by build_kernel.py from lean_yaw_env.vehicles; do not edit. SI units, angles in radians.",
-        "",
-    ]
-    lines += [
-        f"export const {name} = {json.dumps(table, indent=2)};" for name, table in tables.items()
-    ]
-    return "\n".join([*lines, ""])
+    return "\n".join([
+        "// Written by build_kernel.py from lean_yaw_env.vehicles; do not edit. SI units, angles in radians.", "",
+        *(f"export const {name} = {json.dumps(table, indent=2)};" for name, table in tables.items()), "",
+    ])  # fmt: skip
 
 
 def main() -> None:

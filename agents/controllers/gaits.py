@@ -16,14 +16,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import root
 
 from lean_yaw_env.analysis.active_map import ActiveMap, has_downhill
-from lean_yaw_env.analysis.fixed_point import RESIDUAL_LIMIT, solve_fixed_point
+from lean_yaw_env.analysis.fixed_point import solve_fixed_point
 from lean_yaw_env.analysis.path import distance_walked
+from lean_yaw_env.analysis.section_map import RESIDUAL_LIMIT
 from lean_yaw_env.analysis.step_derivatives import StepDerivatives, differentiate_step
 from lean_yaw_env.envs.formulas import advance
 from lean_yaw_env.envs.options import gait_of
@@ -68,41 +70,26 @@ class Pumping:
         return self.downhill + 0.5 * (1.0 - np.cos(headings)) * (self.uphill - self.downhill)
 
 
-@dataclass(frozen=True)
-class LinearStep:
-    """The mirrored step map about a state on the left foot.
-
-    Attributes
-    ----------
-    by_state : shape (6, 6)
-    by_input : shape (6, 2)
-    speed : shape (8,)
-        How the step's speed along the mean heading of its two footprints follows from state and inputs.
-    """
+class LinearStep(NamedTuple):
+    """The mirrored step map about a state on the left foot, and the gradient of its speed."""
 
     by_state: Vector
+    """Shape (6, 6)."""
     by_input: Vector
+    """Shape (6, 2)."""
     speed: Vector
+    """Shape (8,): how the speed along the mean heading of the step's two footprints follows from state and inputs."""
 
 
-def linearise_step(
-    walker: Walker,
-    state: Vector,
-    inter_leg_angle: float,
-    mass_offset: float,
-    previous_offset: float | None = None,
-) -> LinearStep:
-    """Linearise the mirrored step from a left-stance section state (5,), the masses going from ``previous_offset`` to ``mass_offset``.
-
-    Without a previous offset they are held. The derivatives are exact: those of ``differentiate_step``.
+def linearise_step(walker: Walker, state: Vector, command: Command) -> LinearStep:
+    """Linearise the mirrored step from a left-stance section state (5,), exactly: see ``differentiate_step``.
 
     Raises
     ------
     FellError
         If the walker does not complete the step.
     """
-    before = mass_offset if previous_offset is None else previous_offset
-    step = differentiate_step(walker, state, "left", Command(inter_leg_angle, mass_offset, before))
+    step = differentiate_step(walker, state, "left", command)
     by_state, by_input = np.zeros((SIZE, SIZE)), np.zeros((SIZE, 2))
     by_state[:STATE_SIZE, :STATE_SIZE] = MIRROR[:, None] * step.by_state
     by_state[:STATE_SIZE, -1] = MIRROR * (step.by_mass_offset + step.by_previous_offset)
@@ -127,27 +114,16 @@ def _speed_gradient(state: Vector, step: StepDerivatives) -> Vector:
     return (along / named["duration"]).imag / _TINY
 
 
-@dataclass(frozen=True)
-class GaitNode:
-    """A gait on the left foot, and the step map about it.
-
-    Attributes
-    ----------
-    inter_leg_angle : rad
-    state : shape (5,)
-        Its heading is that of the mean of two footprints apart.
-    held_offset : float
-        What holds the heading: the mean of both feet's offsets.
-    pumping : float
-        What the left foot's offset has more than that.
-    speed : float
-    step : LinearStep
-    """
+class GaitNode(NamedTuple):
+    """A gait on the left foot, and the step map about it."""
 
     inter_leg_angle: float
     state: Vector
+    """Its heading is that of the mean of two footprints apart."""
     held_offset: float
+    """What holds the heading: the mean of both feet's offsets."""
     pumping: float
+    """What the left foot's offset has more than that."""
     speed: float
     step: LinearStep
 
@@ -172,49 +148,34 @@ class _GaitGrid:
         """Gaits of the grid, each followed from its neighbour; where one is lost, its neighbour stands for all beyond it."""
         middle = int(np.argmin(np.abs(np.array(ANGLES) - INTER_LEG_ANGLE)))
         straight = self._solve(ANGLES[middle], 0.0, start, 0.0)
-        row = self._row(straight)
-        shorter = self._rows(straight, row, ANGLES[middle - 1 :: -1])
-        longer = self._rows(straight, row, ANGLES[middle + 1 :])
-        return [*shorter[::-1], row, *longer]
-
-    def _rows(
-        self, straight: GaitNode, row: list[GaitNode], angles: Sequence[float]
-    ) -> list[list[GaitNode]]:
-        """Rows of gaits along all headings at inter-leg angles ever farther from a straight gait's."""
-        rows: list[list[GaitNode]] = []
-        for angle in angles:
-            followed = self._followed(straight, angle, 0.0)
-            if followed is None:
-                return rows + [row] * (len(angles) - len(rows))
-            straight, row = followed, self._row(followed)
-            rows.append(row)
-        return rows
+        shorter = self._chain(straight, [(angle, 0.0) for angle in ANGLES[middle - 1 :: -1]])
+        longer = self._chain(straight, [(angle, 0.0) for angle in ANGLES[middle + 1 :]])
+        straights = [*shorter[::-1], straight, *longer]
+        rows = {id(node): self._row(node) for node in straights}  # one that stands for others once
+        return [rows[id(node)] for node in straights]
 
     def _row(self, straight: GaitNode) -> list[GaitNode]:
+        """Gaits along all headings at the inter-leg angle of a straight gait."""
+        headings, half = self._headings, len(self._headings) // 2
         if not self._has_downhill:
-            return [straight] * len(self._headings)
-        half = len(self._headings) // 2
-        right = self._side(straight, self._headings[half - 1 :: -1])
-        return [*right[::-1], straight, *self._side(straight, self._headings[half + 1 :])]
+            return [straight] * len(headings)
+        angle = straight.inter_leg_angle
+        right = self._chain(straight, [(angle, each) for each in headings[half - 1 :: -1]])
+        left = self._chain(straight, [(angle, each) for each in headings[half + 1 :]])
+        return [*right[::-1], straight, *left]
 
-    def _side(self, node: GaitNode, headings: Sequence[float]) -> list[GaitNode]:
-        """Gaits along headings ever farther to one side."""
-        side: list[GaitNode] = []
-        for heading in headings:
-            followed = self._followed(node, node.inter_leg_angle, heading)
-            if followed is None:
-                return side + [node] * (len(headings) - len(side))
-            node = followed
-            side.append(node)
-        return side
-
-    def _followed(self, seed: GaitNode, angle: float, heading: float) -> GaitNode | None:
-        start = seed.state.copy()
-        start[0] += heading
-        try:
-            return self._solve(angle, heading, start, seed.held_offset)
-        except NoGaitError:
-            return None
+    def _chain(self, node: GaitNode, targets: Sequence[tuple[float, float]]) -> list[GaitNode]:
+        """Gaits at (inter-leg angle, heading) ever farther from a node; from a lost one on, the last that was found."""
+        found: list[GaitNode] = []
+        for angle, heading in targets:
+            start = node.state.copy()
+            start[0] += heading
+            try:
+                node = self._solve(angle, heading, start, node.held_offset)
+            except NoGaitError:
+                break
+            found.append(node)
+        return found + [node] * (len(targets) - len(found))
 
     def _solve(self, angle: float, heading: float, start: Vector, held: float) -> GaitNode:
         """The gait that repeats at this heading, and the offset that holds it."""
@@ -235,7 +196,7 @@ class _GaitGrid:
             held_offset=0.5 * (left + right),
             pumping=aside,
             speed=distance / (first.duration + second.duration),
-            step=linearise_step(self._walker, state, angle, left, right),
+            step=linearise_step(self._walker, state, Command(angle, left, right)),
         )
 
 
@@ -274,7 +235,7 @@ def _held_gait(two_steps: ActiveMap, start: Vector) -> tuple[ActiveMap, Vector]:
 
 
 @lru_cache(maxsize=64)
-def gait_nodes(parameters: WalkerParameters, pumping: Pumping) -> tuple[tuple[GaitNode, ...], ...]:
+def gait_nodes(parameters: WalkerParameters, pumping: Pumping) -> list[list[GaitNode]]:
     """Gaits and linear steps over ``ANGLES`` and the family's headings.
 
     Raises
@@ -283,4 +244,4 @@ def gait_nodes(parameters: WalkerParameters, pumping: Pumping) -> tuple[tuple[Ga
         If the walker has no gait straight downhill at the paper's inter-leg angle.
     """
     start = np.array(gait_of(parameters, pumping.downhill))
-    return tuple(tuple(row) for row in _GaitGrid(parameters, pumping).nodes(start))
+    return _GaitGrid(parameters, pumping).nodes(start)

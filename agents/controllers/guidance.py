@@ -23,19 +23,12 @@ _PREVIEW = "preview_"
 
 @dataclass(frozen=True)
 class PathSettings:
-    """Settings of ``PathGuidance``.
-
-    Attributes
-    ----------
-    ahead : leg lengths, downhill
-        Whose path direction is taken: the walker answers that much late.
-    approach : leg lengths
-        Within which a small cross-track error is made good.
-    loop : LqrSettings
-    """
+    """Settings of ``PathGuidance``, in leg lengths."""
 
     ahead: float = 2.4
+    """How far downhill the path's direction is taken: the walker answers that much late."""
     approach: float = 6.0
+    """Within which a small cross-track error is made good."""
     loop: LqrSettings = field(default_factory=LqrSettings)
 
     def __post_init__(self) -> None:
@@ -58,9 +51,11 @@ class PathGuidance(Regulator):
         self._previews = [(name, float(name.removeprefix(_PREVIEW))) for name in names]
         self._slope_ahead = self._slope_weights()
 
-    def _actions(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _regulated(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
         layout = self.loop.layout
-        heading = self._mean_heading(seen)
+        # the mean of the last two footprints', within what previews can be turned back from
+        heading = layout.quantity(seen, "heading") - 0.5 * self.loop.last_turn(seen)
+        heading = np.clip(heading, -1.4, 1.4)
         aside = layout.quantity(seen, "cross_track_error")
         path_heading = heading + layout.quantity(seen, "path_heading_error")
         slope = np.tan(-np.clip(path_heading, -1.4, 1.4))  # to the right per downhill
@@ -71,13 +66,6 @@ class PathGuidance(Regulator):
         there = np.stack(points, axis=-1) @ self._slope_ahead
         wanted = -np.arctan(there) + np.arctan(aside / self.settings.approach)
         return self.loop.actions(seen, wanted - heading)
-
-    def _mean_heading(self, seen: NDArray[np.float32]) -> Vector:
-        """Of the last two footprints, within what previews can be turned back from."""
-        layout = self.loop.layout
-        heading = layout.quantity(seen, "heading")
-        turned = self.loop.last_turn(seen)
-        return np.clip(heading - 0.5 * turned, -1.4, 1.4)
 
     def _slope_weights(self) -> Vector:
         """What the polynomial's slope ahead is made of: the path's place and slope beside the walker, and its places ahead."""
@@ -93,21 +81,14 @@ class PathGuidance(Regulator):
 
 @dataclass(frozen=True)
 class WaypointSettings:
-    """Settings of ``WaypointGuidance``.
-
-    Attributes
-    ----------
-    radius : leg lengths
-        Of the turn that can be relied on. A goal within that turn's circle is not turned to, which would be orbiting it; the walker
-        goes straight on until it can.
-    persistence : rad
-        How far beyond half a turn the walker turns on in the direction that the largest offset turns it to, rather than turn round; in
-        proportion for smaller offsets. To lean over to the other side takes twenty steps.
-    loop : LqrSettings
-    """
+    """Settings of ``WaypointGuidance``."""
 
     radius: float = 4.1
+    """Leg lengths, of the turn that can be relied on. A goal within that turn's circle is not turned to, which would be orbiting it; the walker
+    goes straight on until it can."""
     persistence: float = 0.0
+    """Rad: how far beyond half a turn the walker turns on in the direction that the largest offset turns it to, rather than turn round; in
+    proportion for smaller offsets. To lean over to the other side takes twenty steps."""
     loop: LqrSettings = field(default_factory=LqrSettings)
 
     def __post_init__(self) -> None:
@@ -121,7 +102,7 @@ class WaypointGuidance(Regulator):
     Settings = WaypointSettings
     needs = ("goal_bearing", "goal_distance")
 
-    def _actions(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _regulated(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
         layout = self.loop.layout
         bearing = layout.quantity(seen, "goal_bearing")
         distance = layout.quantity(seen, "goal_distance")

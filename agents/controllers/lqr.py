@@ -7,45 +7,35 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from lean_yaw_env.envs.formulas import wrapped
-from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
+from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, MIRROR, STATE_FIELDS, Vector
 from lean_yaw_env.validation import require_number
 
-from ..agent import State
 from ..observations import ObservationLayout
 from ..settings import tuned
 from .gaits import ANGLES, Pumping
 from .schedule import LqrWeights, Scheduled, schedule_of
+from .simple import MemorylessController, as_actions
 
 
 @dataclass(frozen=True)
 class LqrSettings:
-    """Settings of the walker's inner loop.
-
-    Attributes
-    ----------
-    weights : LqrWeights
-    inter_leg_angle : rad
-        Of the gait to regulate about on the wanted heading, where no speed is commanded.
-    turning_angle : rad, optional
-        Of the gait where the heading error is ``turning_error`` or more: long steps lean, and so turn, most. The same otherwise.
-    turning_error : rad
-    largest_error : rad
-        Larger heading errors are taken as this one: a linear law knows no limits.
-    pumping : Pumping
-        What drives the gait beside the slope.
-    """
+    """Settings of the walker's inner loop; angles in rad."""
 
     weights: LqrWeights = field(default_factory=LqrWeights)
     inter_leg_angle: float = 0.4
+    """Of the gait to regulate about on the wanted heading, where no speed is commanded."""
     turning_angle: float | None = None
+    """Of the gait where the heading error is ``turning_error`` or more: long steps lean, and so turn, most. The same otherwise."""
     turning_error: float = 0.2
     largest_error: float = 1.4
+    """Larger heading errors are taken as this one: a linear law knows no limits."""
     pumping: Pumping = field(default_factory=Pumping)
+    """What drives the gait beside the slope."""
 
     def __post_init__(self) -> None:
         for name in ("inter_leg_angle", "turning_angle"):
@@ -57,14 +47,7 @@ class LqrSettings:
 
 
 class LqrLoop:
-    """The inner loop: actions that bring the walker to a heading, and to a speed.
-
-    Parameters
-    ----------
-    task : str
-    options : EnvOptions
-        Those of the environment.
-    settings : LqrSettings
+    """The inner loop: actions that bring the walker to a heading, and to a speed; ``options`` are the environment's.
 
     Raises
     ------
@@ -80,8 +63,7 @@ class LqrLoop:
         )
         self.settings = settings
         self._options = options
-        change = options.max_offset_change
-        self._largest_change = made.max_offset_change if change is None else change
+        self._largest_change = options.for_task(made).max_offset_change
 
     def side(self, seen: NDArray[np.float32]) -> Vector:
         """+1 where the observation is as of a left stance, -1 where it is to be mirrored; shape (...)."""
@@ -92,15 +74,10 @@ class LqrLoop:
     def actions(
         self, seen: NDArray[np.float32], error: Vector, *, speed: Vector | None = None
     ) -> NDArray[np.float32]:
-        """Actions for observations.
+        """Actions for observations (..., features).
 
-        Parameters
-        ----------
-        seen : shape (..., features)
-        error : shape (...)
-            Wanted heading less the mean of the last two footprints', in the frame of the observation, rad.
-        speed : shape (...), optional
-            Wanted; in place of the settings' inter-leg angles.
+        The error, shape (...), is the wanted heading less the mean of the last two footprints', in the frame of the observation, rad; a wanted
+        speed, shape (...), takes the place of the settings' inter-leg angles.
         """
         side = self.side(seen)
         state, offset = self._section_state(seen, side)
@@ -115,7 +92,8 @@ class LqrLoop:
         # a gait that pumps moves the masses from one side to the other by itself
         change = 2.0 * gait.pumping + inputs[..., 1]
         change = np.clip(change, -self._largest_change, self._largest_change)
-        return self._as_actions(gait.inter_leg_angle + inputs[..., 0], side * (offset + change))
+        angle = gait.inter_leg_angle + inputs[..., 0]
+        return as_actions(angle - INTER_LEG_ANGLE, side * (offset + change), self._options)
 
     def last_turn(self, seen: NDArray[np.float32]) -> Vector:
         """How far the last step turned, as far as the state tells it; in the frame of the observation, rad, shape (...)."""
@@ -152,15 +130,6 @@ class LqrLoop:
         state = np.where(side[..., None] < 0.0, MIRROR * state, state)
         return state, side * self.layout.quantity(seen, "mass_offset")
 
-    def _as_actions(self, angle: Vector, offset: Vector) -> NDArray[np.float32]:
-        options = self._options
-        actions = np.zeros((*np.shape(angle), ACTION_SIZE), dtype=np.float32)
-        if options.inter_leg_angle_range > 0.0:
-            actions[..., 0] = (angle - INTER_LEG_ANGLE) / options.inter_leg_angle_range
-        if options.mass_offset_range > 0.0:
-            actions[..., 1] = offset / options.mass_offset_range
-        return np.clip(actions, -1.0, 1.0)
-
 
 def _deviation(gait: Scheduled, state: Vector, offset: Vector) -> Vector:
     """(..., 5): state without heading, and offset, less the gait's; the masses are where the right foot's step left them."""
@@ -169,22 +138,19 @@ def _deviation(gait: Scheduled, state: Vector, offset: Vector) -> Vector:
     return np.concatenate([rest, (offset - before)[..., None]], axis=-1)
 
 
-class Regulator:
-    """What the regulators of all tasks have in common: the inner loop, and one answer to each observation. They remember nothing.
+class Regulator(MemorylessController):
+    """What the regulators of all tasks have in common: the inner loop, and one answer to each observation.
 
     Parameters
     ----------
-    task : str
-        That shows what the regulator needs.
-    options : EnvOptions
-        Those of the environment.
-    settings : of the class ``Settings``, optional
-        Those that come with the package for the task otherwise.
+    task : one that shows what the regulator needs
+    options : the environment's
+    settings : of the class ``Settings``; those that come with the package for the task otherwise
 
     Raises
     ------
     ValueError
-        If the task does not show it.
+        If the task does not show what is needed.
     NoGaitError
         If the walker has no gait to regulate about.
     """
@@ -199,17 +165,11 @@ class Regulator:
         is_inner = isinstance(self.settings, LqrSettings)
         self.loop = LqrLoop(task, chosen, self.settings if is_inner else self.settings.loop)
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: State = None,
-        episode_start: NDArray[np.bool_] | None = None,
-        deterministic: bool = True,
-    ) -> tuple[NDArray[np.float32], State]:
-        """Actions of the regulator; see ``Agent.predict``."""
-        return self._actions(self.loop.layout.require(observation)), None
+    def _actions(self, observation: Any) -> NDArray[np.float32]:
+        return self._regulated(self.loop.layout.require(observation))
 
-    def _actions(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _regulated(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Actions for observations of the task's layout, shape (..., features)."""
         raise NotImplementedError
 
 
@@ -218,7 +178,7 @@ class HeadingLqr(Regulator):
 
     needs = ("heading_error",)
 
-    def _actions(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _regulated(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
         layout, command = self.loop.layout, "commanded_speed"
         speed = layout.quantity(seen, command) if command in layout.names else None
         return self.loop.actions(seen, layout.quantity(seen, "heading_error"), speed=speed)
@@ -227,7 +187,7 @@ class HeadingLqr(Regulator):
 class UprightLqr(Regulator):
     """Linear-quadratic regulator for tasks that command nothing: it keeps the walker in its gait, straight downhill; see ``Regulator``."""
 
-    def _actions(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _regulated(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
         loop = self.loop
         # where the slope turns with the walker its heading is shown as zero, and any is as good
         mean = loop.layout.quantity(seen, "heading") - 0.5 * loop.last_turn(seen)

@@ -7,7 +7,7 @@ for what it knows.
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ from lean_yaw_env.parameters import Vector
 from lean_yaw_env.validation import require_number
 
 from ..agent import Agent, State
+from ..observations import ObservationLayout
 from ..settings import tuned
 from .guidance import guided
 from .mpc_rollouts import Rollouts
@@ -31,12 +32,6 @@ _FLOOR = 0.12  # least spread, as a share of the first: what is found early may 
 _DIRECTIONS = 3  # of ``PlanSpread``
 
 
-class HasSimulation(Protocol):
-    """An environment of walkers: ``WalkerEnv`` or ``WalkerVectorEnv``."""
-
-    simulation: Simulation
-
-
 class MpcController:
     """Plans some steps ahead at every step; ``attach`` it to the environment first.
 
@@ -45,19 +40,10 @@ class MpcController:
 
     Parameters
     ----------
-    task : str
-    options : EnvOptions
-        Those of the environment.
-    settings : MpcSettings, optional
-        Those kept for the task otherwise.
-    seed : int >= 0
-    base : Agent, optional
-        A controller without memory, whose plan is among those tried; the regulator otherwise, or for a walker without a gait the fixed one.
-
-    Raises
-    ------
-    ValueError
-        If the seed is not a whole number from 0 on.
+    task, options : the environment's
+    settings : those tuned for the task otherwise
+    seed : int >= 0, or ``ValueError``
+    base : a controller without memory, whose plan is among those tried; the regulator otherwise, or for a walker without a gait the fixed one
     """
 
     def __init__(
@@ -70,18 +56,15 @@ class MpcController:
     ) -> None:
         self._task = task
         self._options = EnvOptions() if options is None else options
+        self._layout = ObservationLayout.of(task, self._options)
         self._settings = tuned("mpc", task, MpcSettings()) if settings is None else settings
         self._seed = int(require_number("seed", seed, 0, 2**63))
         self._base = _regulator(task, self._options) if base is None else base
-        settings = self._settings
-        steps, knots = np.arange(settings.horizon), np.array(settings.knots)
-        self._steps_of_knots = np.stack(
-            [np.interp(steps, knots, row) for row in np.eye(len(knots))], axis=1
-        )
-        generator = np.random.default_rng((self._seed, 0))
-        self._tables = generator.standard_normal(
-            (_TABLES, settings.iterations, settings.samples, len(knots), _DIRECTIONS)
-        )
+        own, steps = self._settings, np.arange(self._settings.horizon)
+        weights = [np.interp(steps, own.knots, row) for row in np.eye(len(own.knots))]
+        self._steps_of_knots = np.stack(weights, axis=1)
+        sizes = (_TABLES, own.iterations, own.samples, len(own.knots), _DIRECTIONS)
+        self._tables = np.random.default_rng((self._seed, 0)).standard_normal(sizes)
         self._simulation: Simulation | None = None
         self._rollouts: Rollouts | None = None
 
@@ -93,8 +76,7 @@ class MpcController:
         ValueError
             If the environment is of another task or other options.
         """
-        inner: HasSimulation = getattr(env, "unwrapped", env)
-        simulation = inner.simulation
+        simulation: Simulation = getattr(env, "unwrapped", env).simulation
         if simulation.task.name != self._task:
             raise ValueError(f"env must be of task {self._task!r}, got {simulation.task.name!r}")
         if simulation.options != self._options:
@@ -111,7 +93,7 @@ class MpcController:
     ) -> tuple[NDArray[np.float32], State]:
         """Actions of the best plans found, which are the new state; see ``Agent.predict``.
 
-        Of the observation only the shape is used: the environment is read.
+        Of the observation only the shape is used, and checked: the environment is read.
 
         Raises
         ------
@@ -123,10 +105,11 @@ class MpcController:
         simulation, rollouts = self._simulation, self._rollouts
         if simulation is None or rollouts is None:
             raise RuntimeError("attach(env) must be called before predict: plans are tried on it")
-        shape = np.shape(observation)[:-1]
-        if int(np.prod(shape)) != simulation.n or not np.ndim(observation):
+        seen = self._layout.require(observation)
+        shape = seen.shape[:-1]
+        if int(np.prod(shape)) != simulation.n:
             raise ValueError(
-                f"observation must hold one for each of {simulation.n} walkers, got {np.shape(observation)}"
+                f"observation must hold one for each of {simulation.n} walkers, got {seen.shape}"
             )
         starts = np.ones(simulation.n, dtype=np.bool_)
         left = np.zeros((simulation.n, self._settings.horizon, ACTION_SIZE))
@@ -163,7 +146,10 @@ class MpcController:
             plans = self._plans(centre, tried, block)
             if iteration == 0:
                 plans[:, 1] = base
-            worth = rollouts.worth(plans, block) - self._distrust(plans, base)
+            worth = rollouts.worth(plans, block)
+            if settings.trust:
+                strays = np.square(0.5 * (plans - base[:, None])).mean(axis=(2, 3))
+                worth = worth - settings.trust * strays
             found = worth.argmax(axis=1)
             better = worth[each, found] > most
             best = np.where(better[:, None, None], plans[each, found], best)
@@ -199,11 +185,6 @@ class MpcController:
         plans[..., 1] += change[..., 1] + stance * change[..., 2]
         return np.clip(plans, -1.0, 1.0)
 
-    def _distrust(self, plans: Vector, base: Vector) -> Vector:
-        if self._settings.trust == 0.0:
-            return np.zeros(plans.shape[:2])
-        return self._settings.trust * np.square(0.5 * (plans - base[:, None])).mean(axis=(2, 3))
-
     def _read(self, block: NDArray[np.int64], field: str) -> NDArray[Any]:
         assert self._simulation is not None
         return self._simulation.walkers[field][block]
@@ -215,6 +196,7 @@ def _one_step_on(plans: Vector) -> Vector:
 
 
 def _regulator(task: str, options: EnvOptions) -> Agent:
+    """The regulator; for a walker without a gait the controller that never acts."""
     try:
         return guided(task, options)
     except NoGaitError:

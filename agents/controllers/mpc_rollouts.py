@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,24 +19,15 @@ _LARGEST_PUSH = 10.0  # push level that there is
 _OFFSET = 1  # the action that says which way the masses go
 
 
-@dataclass
 class _Account:
-    """Running worth of plans, row by row."""
+    """Running worth of plans, row by row; of rewards and durations the last two steps'."""
 
-    worth: Vector
-    start: Vector
-    live: NDArray[np.bool_]
-    rewards: Vector
-    durations: Vector
-    """(2, rows): of the last two steps."""
-
-    @classmethod
-    def at(cls, times: Vector) -> _Account:
+    def __init__(self, times: Vector) -> None:
         n = len(times)
-        # the durations are divided by only once there is one
-        return cls(
-            np.zeros(n), times.copy(), np.ones(n, dtype=np.bool_), np.zeros((2, n)), np.full((2, n), 1e-9)
-        )  # fmt: skip
+        self.worth, self.start = np.zeros(n), times.copy()
+        self.live = np.ones(n, dtype=np.bool_)
+        self.rewards = np.zeros((2, n))
+        self.durations = np.full((2, n), 1e-9)  # divided by only once there is one
 
 
 class Rollouts:
@@ -47,15 +38,7 @@ class Rollouts:
     drawn. Without scenarios nobody pushes, and where the task draws something new, a command or a goal, a plan ends; with
     scenarios, numbers are drawn from keys of its own.
 
-    Parameters
-    ----------
-    simulation : Simulation
-        The environment's; read, never changed.
-    settings : MpcSettings
-    base : Agent
-        That remembers nothing; walks the tail.
-    seed : int >= 0
-        Of the scenarios.
+    The environment's simulation is read, never changed; ``base``, which remembers nothing, walks the tail; ``seed`` is that of the scenarios.
     """
 
     def __init__(
@@ -92,7 +75,7 @@ class Rollouts:
             plans[:, step, _OFFSET] *= self._signs(copies)
             copies.actions[:] = actions
             copies.step_many(ended, 0, n)
-            ended |= copies.terminated | copies.truncated
+            ended |= copies.ends.any(axis=0)
         return plans
 
     def worth(self, plans: Vector, block: NDArray[np.int64]) -> Vector:
@@ -102,7 +85,7 @@ class Rollouts:
         draws = max(settings.scenarios, 1)
         copies = self._copied(block, m * draws, is_pushed=True)
         actions = np.repeat(plans.reshape(n * m, settings.horizon, ACTION_SIZE), draws, axis=0)
-        account = _Account.at(copies.walkers["time"])
+        account = _Account(copies.walkers["time"])
         last = settings.horizon + settings.tail - 1
         for step in range(last + 1):
             if step < settings.horizon:
@@ -121,14 +104,15 @@ class Rollouts:
     ) -> None:
         """Take a step into the account; one that the solver gave up counts as a fall."""
         settings, walkers = self._settings, copies.walkers
-        falls = account.live & copies.terminated
+        terminated, truncated = copies.ends
+        falls = account.live & terminated
         rewards = copies.rewards - settings.step_price
         account.worth += np.where(account.live, rewards, 0.0) - settings.fall * falls
         account.rewards[step % 2, account.live] = rewards[account.live]
         account.durations[step % 2, account.live] = walkers["duration"][account.live]
         elapsed = walkers["time"] - account.start
         window = np.minimum(settings.window, copies.settings["horizon"] - account.start)
-        ends = (elapsed >= window) | copies.truncated | is_last
+        ends = (elapsed >= window) | truncated | is_last
         if not settings.scenarios:
             ends |= walkers["counter"] > 0  # the task drew something
         ends &= account.live & ~falls

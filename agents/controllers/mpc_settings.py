@@ -11,18 +11,13 @@ from lean_yaw_env.validation import require_count, require_number
 
 @dataclass(frozen=True)
 class PlanSpread:
-    """First standard deviations of what is tried, as shares of the actions' ranges.
-
-    Attributes
-    ----------
-    angle : of the inter-leg angle
-    steady : of the mass offset to one side
-    alternating : of the mass offset that changes sides with the stance foot, which pumps
-    """
+    """First standard deviations of what is tried, as shares of the actions' ranges."""
 
     angle: float = 0.4
     steady: float = 0.4
+    """Of the mass offset to one side."""
     alternating: float = 0.0
+    """Of the mass offset that changes sides with the stance foot, which pumps."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -33,50 +28,36 @@ class PlanSpread:
 
 @dataclass(frozen=True)
 class MpcSettings:
-    """Settings of ``MpcController``.
-
-    Attributes
-    ----------
-    horizon : 1 to 64 walking steps
-        That are planned.
-    tail : 0 to 64 walking steps
-        That the base controller then walks before a plan is judged, so that no plan is paid for leaving the walker in a bad state.
-    knots : increasing steps from 0 on
-        Where what is tried is drawn; linear in between and held after the last.
-    samples, iterations, elites : int
-        Plans tried at once, how often, and of how many best ones the next are made.
-    spread : PlanSpread
-    window : time
-        In which plans are compared; one that ends earlier goes on at the reward rate of its last two steps.
-    fall : reward
-        That a fall costs.
-    step_price : reward
-        That a step costs, where commands change after so many steps: long ones meet fewer.
-    trust : reward
-        Cost of leaving the base controller's actions by their whole range, mean over a plan.
-    margin : reward
-        By which a plan must be better than the base controller's to be followed in its place.
-    scenarios : 0 to 64
-        Draws of pushes, commands and goals that every plan is tried under, the same for all plans; 0 plans without pushes, up to where the
-        task draws something.
-    push_scale : [0, 10]
-        Size of these pushes, in terms of the environment's.
-    """
+    """Settings of ``MpcController``."""
 
     horizon: int = 16
+    """1 to 64 walking steps that are planned."""
     tail: int = 0
+    """0 to 64 walking steps that the base controller then walks before a plan's worth is taken, so that no plan gains by leaving the walker in a
+    bad state."""
     knots: tuple[int, ...] = (0, 2, 5, 10)
+    """Increasing steps from 0 on, where what is tried is drawn; linear in between and held after the last."""
     samples: int = 48
+    """Plans tried at once."""
     iterations: int = 3
     elites: int = 8
+    """Best plans, of which the next are made."""
     spread: PlanSpread = field(default_factory=PlanSpread)
     window: float = 20.0
+    """Time in which plans are compared; one that ends earlier goes on at the reward rate of its last two steps."""
     fall: float = 50.0
+    """Reward that a fall costs."""
     step_price: float = 0.0
+    """Reward that a step costs, where commands change after so many steps: long ones meet fewer."""
     trust: float = 0.0
+    """Reward that it costs to leave the base controller's actions by their whole range, mean over a plan."""
     margin: float = 0.0
+    """Reward by which a plan must be better than the base controller's to be followed in its place."""
     scenarios: int = 0
+    """0 to 64 draws of pushes, commands and goals that every plan is tried under, the same for all plans; 0 plans without pushes, up to where the
+    task draws something."""
     push_scale: float = 1.0
+    """Size of these pushes, in terms of the environment's, 0 to 10."""
 
     def __post_init__(self) -> None:
         for name, low, high in (

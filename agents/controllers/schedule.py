@@ -16,40 +16,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
+from lean_yaw_env.analysis.active_map import has_downhill
 from lean_yaw_env.kernel.compilation import entry_point
 from lean_yaw_env.parameters import STATE_SIZE, Vector, WalkerParameters
 from lean_yaw_env.validation import require_number
 
-from .gaits import (
-    ANGLES,
-    SIZE,
-    GaitNode,
-    LinearStep,
-    Pumping,
-    gait_nodes,
-    has_downhill,
-    headings_of,
-)
+from .gaits import ANGLES, SIZE, GaitNode, LinearStep, Pumping, gait_nodes, headings_of
 
-_SCALARS = STATE_SIZE  # first column after the state
-_GAIN = _SCALARS + 4
-_TURN = _GAIN + 2 * SIZE
+_ENDS = np.cumsum(
+    [STATE_SIZE, 4, 2 * SIZE]
+)  # in a row of the table: state, scalars, gain; the rest is the turn
 _PRIOR = (0.01, 0.03, 0.05, 0.08, 0.03)
 """How far states stray from the gait, heading apart; weighs what the last step's turn is estimated from."""
 
 
 @dataclass(frozen=True)
 class LqrWeights:
-    """Deviations that cost as much as one another; infinite ones cost nothing.
+    """Deviations that cost as much as one another, in rad, rad / time unit and leg lengths; infinite ones cost nothing.
 
-    Attributes
-    ----------
-    heading, ankle_angle : rad
-    stance_pitch_rate, ankle_rate : rad / time unit
-    mass_offset, offset_change : leg lengths
-    inter_leg_angle : rad
-    speed : leg lengths / time unit
-        Of the step, which the state does not hold: a cost of state and inputs together.
+    The speed is the step's, which the state does not hold: a cost of state and inputs together.
     """
 
     heading: float = 0.08
@@ -151,48 +136,27 @@ def _interpolate(table, angles, headings, at_angles, at_headings, found):
 
 
 class Scheduled(NamedTuple):
-    """What to do near a gait, for any batch of walkers that stand on their left foot.
-
-    Attributes
-    ----------
-    state : shape (..., 5)
-        The gait's section state; its heading is that of the mean of two footprints apart.
-    inter_leg_angle : shape (...)
-        The gait's, rad: what was asked for, or the nearest of which there is a gait.
-    held_offset : shape (...)
-        Mean of both feet's offsets.
-    pumping : shape (...)
-        What the left foot's has more than that.
-    gain : shape (..., 2, 6)
-    turn : shape (..., 5)
-        Times (state without heading, offset), less the gait's: how far the last step turned, less the gait's turn.
-    """
+    """What to do near a gait, for any batch of walkers that stand on their left foot."""
 
     state: Vector
+    """The gait's section state, shape (..., 5); its heading is that of the mean of two footprints apart."""
     inter_leg_angle: Vector
+    """The gait's, rad, shape (...): what was asked for, or the nearest of which there is a gait."""
     held_offset: Vector
+    """Mean of both feet's offsets, shape (...)."""
     pumping: Vector
+    """What the left foot's has more than that, shape (...)."""
     gain: Vector
+    """Shape (..., 2, 6)."""
     turn: Vector
+    """Shape (..., 5); times (state without heading, offset), less the gait's: how far the last step turned, less the gait's turn."""
 
 
 class GainSchedule:
-    """Gaits and optimal gains over inter-leg angle and heading, linear between the nodes of a grid.
+    """Gaits and optimal gains over inter-leg angle and heading, rad, linear between the nodes of a grid.
 
-    Parameters
-    ----------
-    parameters : WalkerParameters
-    weights : LqrWeights
-    pumping : Pumping
-        What drives the gaits beside the slope.
-
-    Attributes
-    ----------
-    angles, headings : rad
-        The grid. Without a downhill the heading means nothing.
-    has_downhill : bool
-        Whether headings are from downhill.
-    speeds : shape (angles, headings)
+    ``pumping`` drives the gaits beside the slope; ``has_downhill`` says whether headings are from downhill, or mean nothing; ``speeds`` has the
+    shape (angles, headings).
 
     Raises
     ------
@@ -200,15 +164,13 @@ class GainSchedule:
         If the walker has no gait straight downhill at 0.3 rad.
     """
 
-    def __init__(
-        self, parameters: WalkerParameters, weights: LqrWeights, pumping: Pumping | None = None
-    ) -> None:
-        drive = Pumping() if pumping is None else pumping
+    def __init__(self, parameters: WalkerParameters, weights: LqrWeights, pumping: Pumping) -> None:
         self.has_downhill = has_downhill(parameters)
         self.angles = np.array(ANGLES)
         # without a downhill one column stands for all, at either end of any range
-        self.headings = np.array(headings_of(parameters, drive)) if self.has_downhill else np.array([-1.0, 1.0])  # fmt: skip
-        nodes = gait_nodes(parameters, drive)
+        headings = headings_of(parameters, pumping) if self.has_downhill else (-1.0, 1.0)
+        self.headings = np.array(headings)
+        nodes = gait_nodes(parameters, pumping)
         self._table = np.array([_row_values(row, weights) for row in nodes])
         self.speeds = np.array([[node.speed for node in row] for row in nodes])
 
@@ -221,10 +183,9 @@ class GainSchedule:
         found = np.empty((angles.size, self._table.shape[-1]))
         grid = (self._table, self.angles, self.headings)
         _interpolate(*grid, angles.ravel(), headings.ravel(), found)
-        found = found.reshape(*angles.shape, -1)
-        gain = found[..., _GAIN:_TURN].reshape(*angles.shape, 2, SIZE)
-        angle, held, pumping, _ = np.moveaxis(found[..., _SCALARS:_GAIN], -1, 0)
-        return Scheduled(found[..., :STATE_SIZE], angle, held, pumping, gain, found[..., _TURN:])
+        state, scalars, gain, turn = np.split(found.reshape(*angles.shape, -1), _ENDS, axis=-1)
+        angle, held, pumping, _ = np.moveaxis(scalars, -1, 0)
+        return Scheduled(state, angle, held, pumping, gain.reshape(*angles.shape, 2, SIZE), turn)
 
     def angles_of(self, speeds: Vector, headings: Vector) -> Vector:
         """The inter-leg angles whose gaits walk at these speeds along these headings, or the nearest of the grid."""
@@ -244,13 +205,13 @@ class GainSchedule:
 
 def _row_values(row: Sequence[GaitNode], weights: LqrWeights) -> list[Vector]:
     """The table's numbers for gaits along headings from one end to the other: those of opposite headings alternate in a walk."""
-    values: dict[int, Vector] = {}
+    values: list[Vector] = [np.empty(0)] * len(row)
     for k in range((len(row) + 1) // 2):
         node, opposite = row[k], row[-1 - k]
         gains = periodic_gains(node.step, opposite.step, weights)
         values[k] = _values(node, gains[0], last_turn(opposite.step, weights))
-        values[len(row) - 1 - k] = _values(opposite, gains[1], last_turn(node.step, weights))
-    return [values[k] for k in range(len(row))]
+        values[-1 - k] = _values(opposite, gains[1], last_turn(node.step, weights))
+    return values
 
 
 def _values(node: GaitNode, gain: Vector, turn: Vector) -> Vector:
@@ -258,15 +219,5 @@ def _values(node: GaitNode, gain: Vector, turn: Vector) -> Vector:
     return np.concatenate([node.state, scalars, gain.ravel(), turn])
 
 
-@lru_cache(maxsize=16)
-def schedule_of(
-    parameters: WalkerParameters, weights: LqrWeights, pumping: Pumping
-) -> GainSchedule:
-    """The schedule of a walker, weights and pumping, made once.
-
-    Raises
-    ------
-    NoGaitError
-        As ``GainSchedule``.
-    """
-    return GainSchedule(parameters, weights, pumping)
+schedule_of = lru_cache(maxsize=16)(GainSchedule)
+"""The schedule of a walker's parameters, weights and pumping, made once."""

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lean_yaw_env.analysis.active_map import has_downhill
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, gait_of
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import STATE_FIELDS, Vector
 from lean_yaw_env.validation import require_finite
 
 from ..agent import State
-from ..observations import ObservationLayout
+from ..observations import ObservationLayout, require_observation
 from ..settings import tuned
-from .gaits import Pumping, has_downhill
+from .gaits import Pumping
 
 _ERROR = "heading_error"
 _SPEED, _SPEED_ERROR = "commanded_speed", "speed_error"
@@ -27,86 +29,102 @@ _MIDDLE_SPEED = 0.42
 """Of the gait at the paper's inter-leg angle on the paper's slope."""
 
 
-class FixedController:
-    """The paper's controller: inter-leg angle 0.3, no mass offset, whatever happens."""
+class MemorylessController:
+    """A controller that answers from its observation alone; a subclass says how in ``_actions``."""
 
     def predict(
         self,
-        observation: ArrayLike,
+        observation: ArrayLike | Mapping[str, ArrayLike],
         state: State = None,
         episode_start: NDArray[np.bool_] | None = None,
         deterministic: bool = True,
     ) -> tuple[NDArray[np.float32], State]:
-        """Zero actions; see ``Agent.predict``."""
-        return np.zeros(_action_shape(observation), dtype=np.float32), None
+        """Actions; see ``Agent.predict``. Nothing is remembered, and nothing drawn but by ``RandomController``."""
+        return self._actions(observation), None
+
+    def _actions(self, observation: Any) -> NDArray[np.float32]:
+        raise NotImplementedError
 
 
-class RandomController:
-    """Draws every action uniformly from the whole action space.
+class FixedController(MemorylessController):
+    """The paper's controller: inter-leg angle 0.3, no mass offset, whatever happens.
 
-    Parameters
-    ----------
-    seed : int >= 0
-        The same seed draws the same actions.
+    With a ``layout`` it refuses observations of another shape.
     """
 
-    def __init__(self, seed: int = 0) -> None:
+    def __init__(self, layout: ObservationLayout | None = None) -> None:
+        self._layout = layout
+
+    def _actions(self, observation: Any) -> NDArray[np.float32]:
+        return np.zeros(_action_shape(observation, self._layout), dtype=np.float32)
+
+
+class RandomController(MemorylessController):
+    """Draws every action uniformly from the whole action space, also if asked for deterministic ones.
+
+    The same seed, a whole number from 0 on, draws the same actions. With a ``layout`` it refuses observations of another shape.
+    """
+
+    def __init__(self, seed: int = 0, layout: ObservationLayout | None = None) -> None:
         self._generator = np.random.default_rng(seed)
+        self._layout = layout
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: State = None,
-        episode_start: NDArray[np.bool_] | None = None,
-        deterministic: bool = False,
-    ) -> tuple[NDArray[np.float32], State]:
-        """Random actions, also if asked for deterministic ones; see ``Agent.predict``."""
-        shape = _action_shape(observation)
-        return self._generator.uniform(-1.0, 1.0, shape).astype(np.float32), None
+    def _actions(self, observation: Any) -> NDArray[np.float32]:
+        shape = _action_shape(observation, self._layout)
+        return self._generator.uniform(-1.0, 1.0, shape).astype(np.float32)
 
 
-def _action_shape(observation: ArrayLike | Mapping[str, ArrayLike]) -> tuple[int, ...]:
-    own = observation["observation"] if isinstance(observation, Mapping) else observation
-    shape = np.shape(own)
-    if not shape:
-        raise ValueError(f"observation must have shape (..., features), got {shape}")
-    return (*shape[:-1], ACTION_SIZE)
+def _action_shape(
+    observation: ArrayLike | Mapping[str, ArrayLike], layout: ObservationLayout | None
+) -> tuple[int, ...]:
+    if layout is not None:
+        seen = layout.require(observation)
+    elif isinstance(observation, Mapping):
+        seen = require_observation(observation["observation"])
+    else:
+        seen = require_observation(observation)
+    return (*seen.shape[:-1], ACTION_SIZE)
+
+
+def as_actions(angle_change: Vector, offset: Vector, options: EnvOptions) -> NDArray[np.float32]:
+    """Actions (..., 2) that mean changes of the inter-leg angle from 0.3 rad and mass offsets, of shape (...), as far as they reach."""
+    actions = np.zeros((*np.shape(offset), ACTION_SIZE), dtype=np.float32)
+    reaches = (options.inter_leg_angle_range, options.mass_offset_range)
+    for k, (value, reach) in enumerate(zip((angle_change, offset), reaches, strict=True)):
+        if reach > 0.0:
+            actions[..., k] = value / reach
+    return np.clip(actions, -1.0, 1.0)
 
 
 @dataclass(frozen=True)
 class HeadingGains:
-    """Gains of ``HeadingFeedback``.
-
-    Attributes
-    ----------
-    proportional : mass offset per rad of heading error
-    ankle, ankle_rate : mass offset per rad, and per rad / time unit, of the ankle's deviation from the gait
-        The derivative: a walker turns as far as it leans, so its lean is the rate of its heading, observed without a delay.
-    feedforward : share of the offset that holds the commanded heading
-    inter_leg_angle : change of the inter-leg angle from 0.3, rad, held all the time
-        Longer steps are slower in time but lean, and so turn, faster.
-    speed : rad of inter-leg angle per commanded speed above 0.42
-    speed_error : rad of inter-leg angle per speed that is lacking
-    pumping : Pumping
-        Offsets away from the stance foot that drive the walker beside the slope.
-    """
+    """Gains of ``HeadingFeedback``."""
 
     proportional: float = 0.051
+    """Mass offset per rad of heading error."""
     ankle: float = -0.056
+    """Mass offset per rad of the ankle's deviation from the gait. A walker turns as far as it leans, so that its lean is the rate of its heading,
+    observed without a delay: the derivative term."""
     ankle_rate: float = 0.0104
+    """The same per rad / time unit."""
     feedforward: float = 0.947
+    """Share of the offset that holds the commanded heading."""
     inter_leg_angle: float = 0.106
+    """Change of the inter-leg angle from 0.3, rad, held all the time. Longer steps are slower in time but lean, and so turn, faster."""
     speed: float = 0.0
+    """Rad of inter-leg angle per commanded speed above 0.42."""
     speed_error: float = 0.0
+    """Rad of inter-leg angle per speed that is lacking."""
     pumping: Pumping = field(default_factory=Pumping)
+    """Offsets away from the stance foot that drive the walker beside the slope."""
 
     def __post_init__(self) -> None:
-        for entry in fields(self):
-            if entry.name != "pumping":
-                require_finite(entry.name, getattr(self, entry.name))
+        for name, value in vars(self).items():
+            if name != "pumping":
+                require_finite(name, value)
 
 
-class HeadingFeedback:
+class HeadingFeedback(MemorylessController):
     """Steers to the commanded heading by moving the masses; sets a commanded speed by the inter-leg angle.
 
     The feedforward is the offset that holds a heading phi for good, sin(phi) = -mu / tan(slope); feedback is on the heading error
@@ -114,12 +132,9 @@ class HeadingFeedback:
 
     Parameters
     ----------
-    task : str
-        A task that shows a heading error.
-    options : EnvOptions
-        Those of the environment.
-    gains : HeadingGains, optional
-        Those tuned for the task otherwise.
+    task : one that shows a heading error
+    options : the environment's
+    gains : those tuned for the task otherwise
 
     Raises
     ------
@@ -144,19 +159,9 @@ class HeadingFeedback:
         self._tangent = math.tan(parameters.slope)
         self._has_downhill = has_downhill(parameters)
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: State = None,
-        episode_start: NDArray[np.bool_] | None = None,
-        deterministic: bool = True,
-    ) -> tuple[NDArray[np.float32], State]:
-        """Actions of the law; see ``Agent.predict``. It remembers nothing and draws nothing."""
+    def _actions(self, observation: Any) -> NDArray[np.float32]:
         seen = self._layout.require(observation)
-        action = np.empty((*seen.shape[:-1], ACTION_SIZE), dtype=np.float32)
-        action[..., 0] = _share(self._angle_change(seen), self._options.inter_leg_angle_range)
-        action[..., 1] = _share(self._offset(seen), self._options.mass_offset_range)
-        return np.clip(action, -1.0, 1.0), None
+        return as_actions(self._angle_change(seen), self._offset(seen), self._options)
 
     def _angle_change(self, seen: NDArray[np.float32]) -> Vector:
         """How far from 0.3 rad the inter-leg angle is to be."""
@@ -186,8 +191,3 @@ class HeadingFeedback:
             + gains.ankle_rate * ankle_rate
             + side * gains.pumping.along(from_downhill)
         )
-
-
-def _share(value: Vector, reach: float) -> Vector:
-    """The action that means a value; none where actions mean nothing."""
-    return value / reach if reach > 0.0 else 0.0 * value

@@ -31,20 +31,15 @@ _FIELDS = (*(field.name for field in STATE_FIELDS), "mass_offset")
 
 
 class Remembered(NamedTuple):
-    """A coordinate that observations depend on beside the section state and the offset.
-
-    Attributes
-    ----------
-    field : of a walker's record
-    motion : the motion that it belongs to
-    scale : a change that an observation shows as about one
-    after : its value after steps, from states (n, k) before them and the steps' outputs (n,) by name
-    """
+    """A coordinate that observations depend on beside the section state and the offset."""
 
     field: str
+    """Of a walker's record."""
     motion: Motion
     scale: float
+    """A change that an observation shows as about one."""
     after: Callable[[Numbers, Mapping[str, Numbers]], Numbers]
+    """Its value after steps, from states (n, k) before them and the steps' outputs (n,) by name."""
 
 
 def _speed(states: Numbers, outputs: Mapping[str, Numbers]) -> Numbers:
@@ -52,34 +47,18 @@ def _speed(states: Numbers, outputs: Mapping[str, Numbers]) -> Numbers:
     return advance(outputs["displacement_x"], outputs["displacement_z"], mean_heading) / outputs["duration"]  # fmt: skip
 
 
-_PREVIOUS_HEADING = Remembered(
-    "previous_heading", "heading", STATE_SCALES[0], lambda states, outputs: states[:, 0]
-)
-_LAST_SPEED = Remembered("speed", "pitch", 0.1, _speed)
-_ASIDE = Remembered(
-    "place_z", "heading", 1.0, lambda states, outputs: states[:, -1] + outputs["displacement_z"]
-)
+_PREVIOUS_HEADING = Remembered("previous_heading", "heading", STATE_SCALES[0], lambda states, _: states[:, 0])  # fmt: skip
 EXTRAS: dict[str, dict[str, Remembered]] = {
-    "SpeedHeading": {"last_speed": _LAST_SPEED},
-    "Slalom": {"aside": _ASIDE},
-}
+    "SpeedHeading": {"last_speed": Remembered("speed", "pitch", 0.1, _speed)},
+    "Slalom": {"aside": Remembered("place_z", "heading", 1.0, lambda states, outputs: states[:, -1] + outputs["displacement_z"])},
+}  # fmt: skip
 """By task. A path is held straight downhill, and the walker's place beside it counts."""
 
 
 class TaskInterface:
     """What a task's environment shows of a state, and what it makes of an action, while its command is held; see ``analysis.ControlInterface``.
 
-    Parameters
-    ----------
-    task : Task
-    options : EnvOptions
-        Without noise, delay and random bodies.
-    commands : what is commanded, by the task's reset options
-
-    Attributes
-    ----------
-    start : shape (k,)
-        The gait that the task's episodes start near, on the left foot.
+    The options are without noise, delay and random bodies; the commands are by the task's reset options.
     """
 
     def __init__(self, task: Task, options: EnvOptions, commands: Mapping[str, float]) -> None:
@@ -95,9 +74,9 @@ class TaskInterface:
         )
         self.reach = np.array([options.inter_leg_angle_range, options.mass_offset_range])
         self._fields = (*_FIELDS, *(each.field for each in self._coordinates.values()))
-        self._first = self._started(commands)
-        self._simulation = self._first
-        self.start = np.array([float(self._first.walkers[name][0]) for name in self._fields])
+        self._simulation = self._started(commands)
+        # the gait that the task's episodes start near, on the left foot
+        self.start = np.array([float(self._first_walker[name][0]) for name in self._fields])
 
     def observe(self, states: Vector, foot: Foot) -> NDArray[np.float32]:
         """What the environment shows of states (n, k)."""
@@ -187,16 +166,12 @@ def closed_loop(
     chosen_task = task_named(task)
     interface = TaskInterface(chosen_task, quiet, commands or {})
     _require_one_answer(agent, interface.observe(interface.start[None], "left"))
-    walker = Walker(quiet.for_task(chosen_task).parameters)
-    return ClosedLoopMap(walker, interface, _predict(agent), interface.start)
 
-
-def _predict(agent: Agent) -> Callable[[NDArray[np.float32]], NDArray[np.float32]]:
     def predict(observations: NDArray[np.float32]) -> NDArray[np.float32]:
-        starts = np.zeros(len(observations), dtype=np.bool_)
-        return agent.predict(observations, None, starts, True)[0]
+        return agent.predict(observations, None, np.zeros(len(observations), np.bool_), True)[0]
 
-    return predict
+    walker = Walker(quiet.for_task(chosen_task).parameters)
+    return ClosedLoopMap(walker, interface, predict, interface.start)
 
 
 def _require_one_answer(agent: Agent, observations: NDArray[np.float32]) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -40,6 +39,13 @@ _WORDS = {
     "ankle_rate": "ankle rate (rad / time unit)",
     "stance_pitch_rate": "stance pitch rate (rad / time unit)",
 }
+_COMPASS = (
+    (0.54, 0.0, -90.0, "pitch rate up: slowed"),
+    (0.0, 0.54, 0.0, "ankle rate up"),
+    (-0.54, 0.0, 90.0, "pitch rate down: sped up"),
+    (0.0, -0.54, 0.0, "ankle rate down"),
+)
+"""Where words stand around a plot of pushes, from its middle, and their turn in degrees."""
 
 
 def save_eigenvalues(reports: Sequence[ClosedLoopReport], path: Path) -> None:
@@ -48,7 +54,13 @@ def save_eigenvalues(reports: Sequence[ClosedLoopReport], path: Path) -> None:
     """
     figure = new_figure(11.4, 5.2)
     plane, ladder = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
-    _draw_plane(plane)
+    angles = np.linspace(0.0, 2.0 * np.pi, 361)
+    for radius, colour, width in ((0.5, STRONG_GRID, 0.8), (1.0, INK, 1.4)):
+        x, y = radius * np.cos(angles), radius * np.sin(angles)
+        plane.plot(x, y, color=unit_colour(colour), linewidth=width)
+    plane.axhline(0.0, color=unit_colour(STRONG_GRID), linewidth=0.6)
+    plane.axvline(0.0, color=unit_colour(STRONG_GRID), linewidth=0.6)
+    plane.set(aspect="equal", xlabel="real part", ylabel="imaginary part")
     ladder.axhline(1.0, color=unit_colour(INK), linewidth=1.4)
     ladder.grid(axis="y", color=unit_colour(STRONG_GRID), linewidth=0.6)
     ladder.set_axisbelow(True)
@@ -65,47 +77,22 @@ def save_eigenvalues(reports: Sequence[ClosedLoopReport], path: Path) -> None:
         if report.gait is None:
             ladder.text(k, 0.5, "no gait", ha="center", rotation=90.0)
     ladder.set_xticks(range(len(reports)), [report.agent for report in reports])
-    ladder.set_xlim(-0.6, len(reports) - 0.4)
-    ladder.set_ylim(bottom=0.0)
-    ladder.set_ylabel("magnitude")
+    ladder.set(xlim=(-0.6, len(reports) - 0.4), ylim=(0.0, None), ylabel="magnitude")
     figure.suptitle(f"{reports[0].task}: eigenvalues of the closed loop's stride")
     figure.legend(handles=_mode_handles(reports), loc="outside right center", frameon=False)
     save_figure(figure, path, dpi=_DPI)
 
 
-def _draw_plane(axes: Axes) -> None:
-    angle = np.linspace(0.0, 2.0 * np.pi, 361)
-    for radius, colour, width in ((0.5, STRONG_GRID, 0.8), (1.0, INK, 1.4)):
-        axes.plot(
-            radius * np.cos(angle), radius * np.sin(angle), color=unit_colour(colour), linewidth=width
-        )  # fmt: skip
-    axes.axhline(0.0, color=unit_colour(STRONG_GRID), linewidth=0.6)
-    axes.axvline(0.0, color=unit_colour(STRONG_GRID), linewidth=0.6)
-    axes.set_aspect("equal")
-    axes.set_xlabel("real part")
-    axes.set_ylabel("imaginary part")
-
-
 def _mode_handles(reports: Sequence[ClosedLoopReport]) -> list[Line2D]:
     """Agents by colour, then modes by shape."""
-    handles = [
-        Line2D(
-            [],
-            [],
-            color=agent_colour(report.agent),
-            marker="o",
-            linestyle="",
-            markersize=8,
-            label=report.agent,
-        )
-        for report in reports
-    ]
-    handles += [
-        Line2D([], [], color="0.25", marker=marker, linestyle="", markersize=7, label=f"mostly {motion}")
-        for motion, marker in _MARKERS.items()
+    keys: list[tuple[str, str, Any, str | None]]
+    keys = [(report.agent, "o", agent_colour(report.agent), None) for report in reports]
+    keys += [(f"mostly {motion}", marker, "0.25", None) for motion, marker in _MARKERS.items()]
+    keys.append(("hollow: neutral", "o", "0.25", "none"))
+    return [
+        Line2D([], [], label=label, marker=marker, color=colour, markerfacecolor=fill, linestyle="", markersize=7)
+        for label, marker, colour, fill in keys
     ]  # fmt: skip
-    hollow = Line2D([], [], color="0.25", marker="o", linestyle="", markersize=7, markerfacecolor="none", label="hollow: neutral")  # fmt: skip
-    return [*handles, hollow]
 
 
 def save_basins(reports: Sequence[ClosedLoopReport], path: Path) -> None:
@@ -124,16 +111,20 @@ def save_basins(reports: Sequence[ClosedLoopReport], path: Path) -> None:
             place = axes[row, column]
             place.pcolormesh(found[x], found[y], found.ending.T, cmap=colours, norm=norm)
             place.plot(centre[x], centre[y], marker="+", color="black", markersize=9)
-            place.set_title(
-                f"{report.agent}: {100.0 * share_survived(found):.0f} %", fontsize="medium"
-            )
+            share = f"{100.0 * share_survived(found):.0f} %"
+            place.set_title(f"{report.agent}: {share}", fontsize="medium")
             place.set_xlabel(_WORDS[x])
             seen |= set(np.unique(found.ending).tolist())
             if column == 0:
                 place.set_ylabel(_WORDS[y])
     figure.suptitle(f"{reports[0].task}: how a walk from each start ends, share survived")
     handles: list[Any] = [
-        Patch(facecolor=_ENDING_COLOURS[k], edgecolor="black", linewidth=0.5, label=_ending(key))
+        Patch(
+            facecolor=_ENDING_COLOURS[k],
+            edgecolor="black",
+            linewidth=0.5,
+            label=f"fell: {ENDINGS[key]}" if key else "still walking",
+        )
         for k, key in enumerate(keys)
         if key in seen
     ]
@@ -145,38 +136,27 @@ def save_basins(reports: Sequence[ClosedLoopReport], path: Path) -> None:
 
 def save_pushes(reports: Sequence[ClosedLoopReport], path: Path) -> None:
     """Draw the largest push survived in every direction of the two rates; once more near the middle, where the weak directions are."""
-    pushed = [report for report in reports if report.pushes is not None]
+    pushed = {each.agent: each.pushes for each in reports if each.pushes is not None}
     figure = new_figure(12.4, 5.6)
-    least = [float(report.pushes.sizes.min()) for report in pushed if report.pushes]
+    least = [float(pushes.sizes.min()) for pushes in pushed.values()]
     worst = float(np.median(least)) if least else 1.0
     for k, (reach, title) in enumerate(((None, "all of it"), (2.2 * worst, "near the middle"))):
         axes: Any = figure.add_subplot(1, 2, k + 1, projection="polar")
-        for report in pushed:
-            if report.pushes is not None:
-                label = report.agent if k == 0 else None
-                _draw_pushes(axes, report.pushes, agent_colour(report.agent), label)
+        for agent, pushes in pushed.items():
+            _draw_pushes(axes, pushes, agent_colour(agent), agent if k == 0 else None)
         axes.set_ylim(0.0, reach)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         axes.set_rlabel_position(67.5)
         axes.set_xticks(np.pi * np.arange(0.0, 2.0, 0.5), [""] * 4)
-        for x, y, words in _COMPASS:
+        for x, y, turn, words in _COMPASS:
             axes.text(
-                0.5 + x, 0.5 + y, words, transform=axes.transAxes, rotation=-90.0 * x / 0.54 if x else 0.0,
-                ha="center", va="center", fontsize="small",
+                0.5 + x, 0.5 + y, words, transform=axes.transAxes, rotation=turn, ha="center", va="center", fontsize="small"
             )  # fmt: skip
         axes.set_title(title, pad=24, fontsize="medium")
     figure.suptitle(f"{reports[0].task}: largest push survived (rad / time unit)")
     if pushed:
         figure.legend(loc="outside right center", frameon=False)
     save_figure(figure, path, dpi=_DPI)
-
-
-_COMPASS = (
-    (0.54, 0.0, "pitch rate up: slowed"),
-    (0.0, 0.54, "ankle rate up"),
-    (-0.54, 0.0, "pitch rate down: sped up"),
-    (0.0, -0.54, "ankle rate down"),
-)
 
 
 def _draw_pushes(axes: Any, pushes: LargestPushes, colour: Any, label: str | None) -> None:
@@ -186,7 +166,3 @@ def _draw_pushes(axes: Any, pushes: LargestPushes, colour: Any, label: str | Non
     axes.plot(angles, sizes, color=colour, linewidth=1.8, marker=".", label=label)
     beyond = ~pushes.is_limited
     axes.plot(pushes.angles[beyond], pushes.sizes[beyond], "o", color=colour, markersize=8)
-
-
-def _ending(key: float) -> str:
-    return "still walking" if key == 0.0 else f"fell: {ENDINGS[key]}"

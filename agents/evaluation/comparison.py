@@ -1,203 +1,168 @@
-"""Which agent is better: comparisons on the same episodes, and whether the agents of a task come in the order that is expected of them."""
+"""Which agent is better: comparisons on the same episodes, and claims whose p-values are corrected for how many there are."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from lean_yaw_env.envs.tasks import task_named
 
-from ..registry import agent_entry
-from .episodes import RETURN, SURVIVAL, Results, Row, is_share, metric_row
-from .intervals import Estimate, Resampled, resample
+from ..registry import AGENTS
+from .episodes import Results, Row, direction, is_share, metric_row
+from .intervals import CONFIDENCE, UNDEFINED, Estimate, holm
 
 Verdict = Literal["better", "worse", "tie", "mixed"]
-_VERDICTS: dict[int, Verdict] = {1: "better", -1: "worse", 0: "tie"}
+ResultsByAgent = Mapping[str, Results]
+"""Of one task."""
+Rivals = Mapping[str, str | None]
+"""By task, the feedback controller that agents are compared with; None where there is none."""
+ENTERED = "entered"
+"""Kind of an agent that is not of this package."""
 
 
-@dataclass
-class Sample:
-    """An agent's results with their resamples, each drawn once.
-
-    Parameters
-    ----------
-    results : Results
-    stream : int
-        Another for each agent: see ``intervals.resample``.
-    """
-
-    results: Results
-    stream: int = 0
-    _drawn: dict[tuple[str, int], Resampled] = field(default_factory=dict)
-
-    def drawn(self, metric: str, episodes: int | None = None) -> Resampled:
-        """Resamples of a metric, of the first episodes or all."""
-        count = self.results.episodes if episodes is None else episodes
-        if (metric, count) not in self._drawn:
-            values = self.results.values(metric)[:, :count]
-            self._drawn[metric, count] = resample(values, self.stream)
-        return self._drawn[metric, count]
+def kind_of(agent: str) -> str:
+    """The kind of an agent of the registry, or ``ENTERED``."""
+    return AGENTS[agent].kind if agent in AGENTS else ENTERED
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """How an agent does against another in a metric, on the episodes that both have walked.
-
-    Attributes
-    ----------
-    agent, other, metric : str
-    mean, iqm : Estimate
-        The first's less the second's mean, and interquartile mean; the latter is NaN for a share.
-    verdict : Verdict
-        ``better`` or ``worse`` by the mean, which counts every fall, if the interval of its difference leaves out zero, and ``tie``
-        otherwise; ``mixed`` if the interquartile means say the opposite.
-    episodes : int
-    """
-
-    agent: str
-    other: str
-    metric: str
-    mean: Estimate
-    iqm: Estimate
-    verdict: Verdict
-    episodes: int
-
-
-def direction(task: str, metric: str) -> int:
-    """+1 for a metric of which more is better, -1 for one of which less is, 0 for one that only describes."""
-    if metric in (RETURN, SURVIVAL):
-        return 1
-    known = task_named(task).metrics.get(metric)
-    better = None if known is None else known.better
-    return {"higher": 1, "lower": -1, None: 0}[better]
-
-
-def compare(first: Sample, second: Sample, metric: str) -> Comparison:
-    """Compare two agents in a metric that has a direction."""
-    task = first.results.task
-    episodes = min(first.results.episodes, second.results.episodes)
-    less = first.drawn(metric, episodes).less(second.drawn(metric, episodes))
-    mean, iqm = less.mean_estimate(), less.iqm_estimate()
-    sign = direction(task, metric)
-    by_mean, by_iqm = sign * _sign(mean), sign * _sign(iqm)
-    if is_share(task, metric):
-        iqm, by_iqm = Estimate(*[float("nan")] * 3), 0
-    verdict = "mixed" if by_mean * by_iqm < 0 else _VERDICTS[by_mean]
-    return Comparison(
-        first.results.agent, second.results.agent, metric, mean, iqm, verdict, episodes
-    )
-
-
-def samples_of(results: Sequence[Results]) -> dict[str, Sample]:
-    """The agents of one task by name, ready to be compared."""
-    return {each.agent: Sample(each, stream) for stream, each in enumerate(results)}
-
-
-def samples_by_task(results: Sequence[Results]) -> dict[str, dict[str, Sample]]:
-    """Results by task and agent, ready to be compared."""
+def by_task(results: Sequence[Results]) -> dict[str, dict[str, Results]]:
+    """Results by task and agent."""
     return {
-        task: samples_of([each for each in results if each.task == task])
+        task: {each.agent: each for each in results if each.task == task}
         for task in dict.fromkeys(each.task for each in results)
     }
 
 
-def compared_rows(samples: Mapping[str, Mapping[str, Sample]], threads: int = 1) -> list[Row]:
-    """Rows of every task, its agents compared with one another; numpy's loops let threads share the tasks."""
-    with ThreadPoolExecutor(threads) as pool:
-        return [row for rows in pool.map(task_rows, samples.values()) for row in rows]
-
-
-def best_feedback(samples: Mapping[str, Sample]) -> str | None:
+def best_feedback(results: ResultsByAgent) -> str | None:
     """The feedback controller with the best mean of the task's headline; None if there is none."""
-    names = [name for name in samples if agent_entry(name).kind == "feedback"]
+    names = [name for name in results if kind_of(name) == "feedback"]
     if not names:
         return None
-    task = samples[names[0]].results.task
+    task = results[names[0]].task
     headline = task_named(task).headline
-    sign = direction(task, headline)
-    return max(names, key=lambda name: sign * samples[name].drawn(headline).mean)
+    means = {name: float(np.nanmean(results[name].values(headline))) for name in names}
+    return max(names, key=lambda name: direction(task, headline) * means[name])
 
 
-def task_rows(samples: Mapping[str, Sample]) -> list[Row]:
-    """A row for each metric of each agent, compared with the best feedback controller where there is one.
-
-    What some episodes leave undefined, as the time to settle of an agent that never settles, is no ground to compare on.
-    """
-    rival = best_feedback(samples)
-    rows: list[Row] = []
-    for name, sample in samples.items():
-        for metric in (*sample.results.metrics, SURVIVAL):
-            row = metric_row(sample.results, metric, sample.drawn(metric))
-            if (
-                rival is not None
-                and name != rival
-                and _is_comparable(metric, sample, samples[rival])
-            ):
-                row = _with_comparison(row, compare(sample, samples[rival], metric))
-            rows.append(row)
-    return rows
+def rivals_of(results: Mapping[str, ResultsByAgent]) -> dict[str, str | None]:
+    """Each task's best feedback controller."""
+    return {task: best_feedback(of_task) for task, of_task in results.items()}
 
 
-def _is_comparable(metric: str, *samples: Sample) -> bool:
-    if direction(samples[0].results.task, metric) == 0:
-        return False
-    return all(np.isfinite(sample.results.values(metric)).all() for sample in samples)
+class Comparison(NamedTuple):
+    """An agent less another in a metric, on the episodes that both have walked."""
+
+    mean: Estimate
+    """The difference of the means."""
+    iqm: Estimate
+    """The difference of the interquartile means; NaN for a share."""
+    p_value: float
+    """Two-sided, of the means being equal; no smaller than a sign test's can be on so few episodes."""
+    episodes: int
 
 
-def _with_comparison(row: Row, comparison: Comparison) -> Row:
-    value, low, high = comparison.mean
-    return replace(
-        row,
-        against=comparison.other,
-        difference=value,
-        difference_low=low,
-        difference_high=high,
-        verdict=comparison.verdict,
-    )
-
-
-def _sign(difference: Estimate) -> int:
-    if difference.low > 0.0:
-        return 1
-    return -1 if difference.high < 0.0 else 0
+def compare(first: Results, second: Results, metric: str) -> Comparison:
+    """Compare two agents in a metric."""
+    episodes = min(first.episodes, second.episodes)
+    difference = first.resampled(metric, episodes).less(second.resampled(metric, episodes))
+    iqm = UNDEFINED if is_share(first.task, metric) else difference.iqm_estimate()
+    p_value = max(difference.p_value(), 2.0 ** (1 - episodes))
+    return Comparison(difference.mean_estimate(), iqm, p_value, episodes)
 
 
 @dataclass(frozen=True)
-class Expectation:
-    """Whether one agent is better than another at a task, by its headline; ``comparison`` is None where one of them is missing."""
+class Claim:
+    """That one agent is better than another at a task, by the mean of its headline, which counts every fall."""
 
     task: str
-    worse: str
     better: str
-    comparison: Comparison | None
+    worse: str
+    comparison: Comparison
+    p_value: float
+    """Corrected for the number of claims."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """``better`` or ``worse`` if the corrected p-value is below 0.05, and ``tie`` otherwise; ``mixed`` if the interval of the difference of
+        the interquartile means lies on the other side of zero."""
+        if not self.p_value < 1.0 - CONFIDENCE:
+            return "tie"
+        sign = direction(self.task, task_named(self.task).headline)
+        mean, iqm = (sign * np.array(each) for each in (self.comparison.mean, self.comparison.iqm))
+        if mean[0] > 0.0:
+            return "mixed" if (iqm < 0.0).all() else "better"
+        return "mixed" if (iqm > 0.0).all() else "worse"
 
     @property
     def holds(self) -> bool:
-        return self.comparison is not None and self.comparison.verdict == "better"
+        return self.verdict == "better"
 
 
-def expectations_of(task: str, samples: Mapping[str, Sample]) -> list[Expectation]:
-    """Random below fixed, fixed below the best feedback controller, and that below whatever plans or has learned."""
-    rival = best_feedback(samples)
-    pairs = [("random", "fixed")]
-    if rival is not None:
-        pairs.append(("fixed", rival))
-        pairs += [
-            (rival, name) for name in samples if agent_entry(name).kind in ("planner", "learned")
-        ]
-    headline = task_named(task).headline
+def claims_of(
+    results: Mapping[str, ResultsByAgent], rivals: Rivals, threads: int = 1
+) -> list[Claim]:
+    """Every claim: the fixed controller against random actions, and every other agent against its task's rival, as the better one.
+
+    numpy's loops let threads share the comparisons.
+    """
+    pairs: list[tuple[str, str, str]] = []
+    for task, of_task in results.items():
+        rival = rivals.get(task)
+        if "random" in of_task and "fixed" in of_task:
+            pairs.append((task, "fixed", "random"))
+        if rival is not None and rival in of_task:
+            pairs += [(task, name, rival) for name in of_task if name != rival]
+
+    def compared(pair: tuple[str, str, str]) -> Comparison:
+        task, better, worse = pair
+        return compare(results[task][better], results[task][worse], task_named(task).headline)
+
+    with ThreadPoolExecutor(threads) as pool:
+        comparisons = list(pool.map(compared, pairs))
+    corrected = holm([each.p_value for each in comparisons])
     return [
-        Expectation(
-            task,
-            worse,
-            better,
-            compare(samples[better], samples[worse], headline)
-            if worse in samples and better in samples
-            else None,
-        )
-        for worse, better in pairs
+        Claim(*pair, comparison, p_value)
+        for pair, comparison, p_value in zip(pairs, comparisons, corrected, strict=True)
     ]
+
+
+def compared_rows(
+    results: Mapping[str, ResultsByAgent], rivals: Rivals, threads: int = 1
+) -> tuple[list[Row], list[Claim]]:
+    """A row for each metric of each agent, compared with the task's rival where there is one; and the claims.
+
+    What some episodes leave undefined, as the time to settle of an agent that never settles, is no ground to compare on.
+    """
+    claims = claims_of(results, rivals, threads)
+    against = {
+        (each.task, each.better): each for each in claims if each.worse == rivals.get(each.task)
+    }
+    everything = [each for of_task in results.values() for each in of_task.values()]
+
+    def rows_of(mine: Results) -> list[Row]:
+        rival = results[mine.task].get(rivals.get(mine.task) or "")
+        rows = [_compared(metric_row(mine, metric), mine, rival) for metric in mine.metrics]
+        claim, headline = against.get((mine.task, mine.agent)), task_named(mine.task).headline
+        if claim is None:
+            return rows
+        found = {"p_value": claim.p_value, "verdict": claim.verdict}
+        return [replace(row, **found) if row.metric == headline else row for row in rows]
+
+    with ThreadPoolExecutor(threads) as pool:
+        return [row for rows in pool.map(rows_of, everything) for row in rows], claims
+
+
+def _compared(row: Row, mine: Results, rival: Results | None) -> Row:
+    """The row with its difference from the rival's, where that means something."""
+    if rival is None or rival is mine or direction(row.task, row.metric) == 0:
+        return row
+    if not all(np.isfinite(each.values(row.metric)).all() for each in (mine, rival)):
+        return row
+    value, low, high = compare(mine, rival, row.metric).mean
+    return replace(
+        row, against=rival.agent, difference=value, difference_low=low, difference_high=high
+    )

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
+import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import Vector
 
-from .intervals import Estimate, Resampled, resample, share_estimate
+from .intervals import CLAIM_RESAMPLES, RESAMPLES, UNDEFINED, Resampled, resample, share_estimate
 
 RETURN = "return"
 SPEED = "speed"
@@ -20,29 +23,68 @@ SURVIVAL = "survival"
 
 @dataclass(frozen=True)
 class Episodes:
-    """What came of an agent's episodes.
-
-    Attributes
-    ----------
-    survived : bool, shape (episodes,)
-        Whether the time limit and nothing else ended it.
-    metrics : by name, each of shape (episodes,)
-        ``return``, the task's metrics and ``speed`` (distance over time); NaN where an episode leaves one undefined.
-    """
+    """What came of an agent's episodes, in arrays of shape (episodes,)."""
 
     survived: NDArray[np.bool_]
+    """Whether the time limit or a success ended it."""
     metrics: dict[str, Vector]
+    """``return``, the task's metrics and ``speed`` (distance over time) by name; NaN where an episode leaves one undefined."""
 
     @classmethod
     def joined(cls, parts: Sequence[Episodes]) -> Episodes:
         """Episodes one after the other."""
-        return cls(
-            np.concatenate([part.survived for part in parts]),
-            {
-                name: np.concatenate([part.metrics[name] for part in parts])
-                for name in parts[0].metrics
-            },
-        )
+        names = parts[0].metrics
+        metrics = {name: np.concatenate([part.metrics[name] for part in parts]) for name in names}
+        return cls(np.concatenate([part.survived for part in parts]), metrics)
+
+
+@dataclass(frozen=True)
+class Results:
+    """One agent's episodes at a task, (trainings, episodes): the same episodes for each of its trainings."""
+
+    task: str
+    agent: str
+    runs: tuple[Episodes, ...]
+    """One for each training."""
+    options: EnvOptions = field(default_factory=EnvOptions)
+    seconds: float = 0.0
+    """Of one core that the episodes took."""
+    _resampled: dict[tuple[str, int], Resampled] = field(
+        default_factory=dict, repr=False, compare=False
+    )
+
+    def __post_init__(self) -> None:
+        lengths = {len(run.survived) for run in self.runs}
+        if len(lengths) != 1:
+            raise ValueError(
+                f"runs must be one or more of the same episodes, got runs of {sorted(lengths)}"
+            )
+
+    @property
+    def episodes(self) -> int:
+        return len(self.runs[0].survived)
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        return (*self.runs[0].metrics, SURVIVAL)
+
+    def values(self, metric: str) -> Vector:
+        """Shape (trainings, episodes); ``survival`` is 0 or 1."""
+        if metric == SURVIVAL:
+            return np.stack([run.survived for run in self.runs]).astype(float)
+        return np.stack([run.metrics[metric] for run in self.runs])
+
+    def resampled(self, metric: str, episodes: int | None = None) -> Resampled:
+        """Resamples of a metric's values in the first episodes, or all; drawn once."""
+        count = self.episodes if episodes is None else episodes
+        if (metric, count) not in self._resampled:
+            # an agent's trainings are drawn by themselves, alike whoever else is evaluated
+            stream = zlib.crc32(self.agent.encode())
+            is_claimed = metric == task_named(self.task).headline
+            resamples = CLAIM_RESAMPLES if is_claimed else RESAMPLES
+            drawn = resample(self.values(metric)[:, :count], stream, resamples)
+            self._resampled[metric, count] = drawn
+        return self._resampled[metric, count]
 
 
 @dataclass(frozen=True)
@@ -53,25 +95,16 @@ class Row:
 
     Attributes
     ----------
-    task, agent, metric : str
-    mean, low, high : float
-        The mean, for a metric that is 0 or 1 the share, with its 95 % interval.
-    survival : float
-        Share of the episodes that nothing but the time limit ended.
-    episodes : int
-        Of each training.
-    iqm, iqm_low, iqm_high : float
-        The interquartile mean with its 95 % interval; NaN for a share.
-    trainings : int
-        Policies of as many trainings are pooled; 1 for what is not trained.
-    least_training, greatest_training : float
-        The lowest and the highest mean of a training.
-    against : str or None
-        The agent it is compared with, on the episodes that both have walked.
-    difference, difference_low, difference_high : float
-        The mean less that agent's, with its 95 % interval; NaN where there is no comparison.
-    verdict : str or None
-        "better", "worse", "tie" or "mixed": see ``comparison.Comparison``.
+    mean, low, high : the mean, for a metric that is 0 or 1 the share, with its 95 % interval
+    survival : share of the episodes that the time limit or a success ended
+    episodes : of each training
+    iqm, iqm_low, iqm_high : the interquartile mean with its 95 % interval; NaN for a share
+    trainings : policies of as many trainings are pooled; 1 for what is not trained
+    least_training, greatest_training : the lowest and the highest mean of a training
+    against : the feedback controller that it is compared with, on the episodes that both have walked
+    difference, difference_low, difference_high : the mean less that agent's, with its 95 % interval; NaN where there is no comparison
+    p_value : of the difference being zero, of the task's headline only; corrected for the number of claims (Holm)
+    verdict : "better", "worse", "tie" or "mixed", by that p-value: see ``comparison.Claim``
     """
 
     task: str
@@ -89,51 +122,11 @@ class Row:
     least_training: float
     greatest_training: float
     against: str | None = None
-    difference: float = float("nan")
-    difference_low: float = float("nan")
-    difference_high: float = float("nan")
+    difference: float = math.nan
+    difference_low: float = math.nan
+    difference_high: float = math.nan
+    p_value: float = math.nan
     verdict: str | None = None
-
-
-@dataclass(frozen=True)
-class Results:
-    """One agent's episodes at a task, (trainings, episodes): the same episodes for each of its trainings.
-
-    Parameters
-    ----------
-    task, agent : str
-    runs : one for each training
-    """
-
-    task: str
-    agent: str
-    runs: tuple[Episodes, ...]
-
-    def __post_init__(self) -> None:
-        lengths = {len(run.survived) for run in self.runs}
-        if len(lengths) != 1:
-            raise ValueError(
-                f"runs must be one or more of the same episodes, got runs of {sorted(lengths)}"
-            )
-
-    @property
-    def episodes(self) -> int:
-        return len(self.runs[0].survived)
-
-    @property
-    def survived(self) -> NDArray[np.bool_]:
-        """Shape (trainings, episodes)."""
-        return np.stack([run.survived for run in self.runs])
-
-    @property
-    def metrics(self) -> tuple[str, ...]:
-        return tuple(self.runs[0].metrics)
-
-    def values(self, metric: str) -> Vector:
-        """Shape (trainings, episodes); ``survival`` is 0 or 1."""
-        if metric == SURVIVAL:
-            return self.survived.astype(float)
-        return np.stack([run.metrics[metric] for run in self.runs])
 
 
 def is_share(task: str, metric: str) -> bool:
@@ -142,34 +135,39 @@ def is_share(task: str, metric: str) -> bool:
     return metric == SURVIVAL or (known is not None and known.is_share)
 
 
+def direction(task: str, metric: str) -> int:
+    """+1 for a metric of which more is better, -1 for one of which less is, 0 for one that only describes."""
+    if metric in (RETURN, SURVIVAL):
+        return 1
+    known = task_named(task).metrics.get(metric)
+    better = None if known is None else known.better
+    return {"higher": 1, "lower": -1, None: 0}[better]
+
+
 def summary(results: Results) -> list[Row]:
     """A row for each metric, ``survival`` last."""
-    return [metric_row(results, metric) for metric in (*results.metrics, SURVIVAL)]
+    return [metric_row(results, metric) for metric in results.metrics]
 
 
-def metric_row(results: Results, metric: str, resampled: Resampled | None = None) -> Row:
-    """The row of a metric; ``resampled`` are its values' resamples where there are some already."""
+def metric_row(results: Results, metric: str) -> Row:
+    """The row of a metric, compared with no one."""
     values = results.values(metric)
     if is_share(results.task, metric):
-        mean, iqm = share_estimate(values > 0.0), Estimate(*[float("nan")] * 3)
+        mean, iqm = share_estimate(values > 0.0), UNDEFINED
     else:
-        drawn = resample(values) if resampled is None else resampled
+        drawn = results.resampled(metric)
         mean, iqm = drawn.mean_estimate(), drawn.iqm_estimate()
-    of_trainings = [_defined_mean(run) for run in values]
+    defined = [run[np.isfinite(run)] for run in values]
+    means = [float(run.mean()) if len(run) else math.nan for run in defined]
     return Row(
         results.task,
         results.agent,
         metric,
         *mean,
-        float(results.survived.mean()),
+        float(results.values(SURVIVAL).mean()),
         results.episodes,
         *iqm,
         len(values),
-        min(of_trainings),
-        max(of_trainings),
+        min(means),
+        max(means),
     )
-
-
-def _defined_mean(values: Vector) -> float:
-    defined = values[np.isfinite(values)]
-    return float(defined.mean()) if len(defined) else float("nan")

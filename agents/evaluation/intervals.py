@@ -1,18 +1,17 @@
 """Means and interquartile means with 95 % intervals, and differences between agents, by bootstrap.
 
-As Agarwal et al. (2021, "Deep reinforcement learning at the edge of the statistical precipice") ask for: interquartile means beside means,
-percentile bootstrap intervals, each task drawn for itself. What is drawn anew are the episodes and, of an agent that was trained several
+Means with survival beside them come first, as they count every fall; interquartile means stand beside. As Agarwal et al. (2021, "Deep reinforcement learning at the edge of the statistical precipice") ask for, intervals are
+those of a percentile bootstrap, each task drawn for itself. What is drawn anew are the episodes and, of an agent that was trained several
 times, the trainings too, so that an interval holds for another training on other episodes. All trainings walk the same episodes: rows and
 columns of one table are drawn, each once for the whole of it (Owen, 2007, "The pigeonhole bootstrap", Annals of Applied Statistics 1), which
 errs towards wide intervals. Every agent gets the same draws of episodes, so that differences are those of pairs.
-
-Their library, rliable, draws along one axis only and, in version 1.2.0, from numpy's global generator whatever seed it is given, and needs
-arch, pandas, seaborn and absl; the few lines here are numpy's.
+Their library, rliable, draws along one axis only.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -24,6 +23,8 @@ from lean_yaw_env.parameters import Vector
 
 CONFIDENCE = 0.95
 RESAMPLES = 2000
+CLAIM_RESAMPLES = 10_000
+"""Of what is claimed: the smallest p-value is 2 / (CLAIM_RESAMPLES + 1), and Holm's first limit is 0.05 over the number of claims."""
 _BLOCK = 100  # resamples at a time: some megabytes
 _QUARTER = 0.25
 
@@ -36,9 +37,11 @@ class Estimate(NamedTuple):
     high: float
 
 
-@dataclass(frozen=True)
-class Resampled:
-    """Mean and interquartile mean of values, and of as many resamples as ``RESAMPLES``: shape (RESAMPLES,) each."""
+UNDEFINED = Estimate(math.nan, math.nan, math.nan)
+
+
+class Resampled(NamedTuple):
+    """Mean and interquartile mean of values, and of their resamples: shape (resamples,) each."""
 
     mean: float
     iqm: float
@@ -51,30 +54,36 @@ class Resampled:
     def iqm_estimate(self) -> Estimate:
         return _estimate(self.iqm, self.iqms)
 
+    def p_value(self) -> float:
+        """Two-sided, of the mean being zero: twice the smaller share of resamples on either side of zero, the values themselves counted once."""
+        count = min(np.count_nonzero(self.means <= 0.0), np.count_nonzero(self.means >= 0.0))
+        return min(1.0, 2.0 * (1 + count) / (1 + len(self.means)))
+
     def less(self, other: Resampled) -> Resampled:
         """The differences to another agent's on the same episodes."""
         return Resampled(
-            self.mean - other.mean,
-            self.iqm - other.iqm,
-            self.means - other.means,
-            self.iqms - other.iqms,
-        )
+            self.mean - other.mean, self.iqm - other.iqm, self.means - other.means, self.iqms - other.iqms
+        )  # fmt: skip
 
 
-def resample(values: Vector, stream: int = 0) -> Resampled:
+def holm(p_values: Sequence[float]) -> list[float]:
+    """p-values corrected for how many there are (Holm, 1979): those below a limit are all true with at least the limit's confidence."""
+    order = np.argsort(p_values, kind="stable")
+    factors = np.arange(len(p_values), 0, -1)
+    corrected = np.empty(len(p_values))
+    corrected[order] = np.minimum(np.maximum.accumulate(factors * np.asarray(p_values)[order]), 1.0)
+    return corrected.tolist()
+
+
+def resample(values: Vector, stream: int = 0, resamples: int = RESAMPLES) -> Resampled:
     """Draw episodes and trainings anew.
 
     Parameters
     ----------
     values : shape (trainings, episodes)
-        NaN where an episode leaves one undefined: those are left out.
+        NaN where an episode leaves one undefined: those are left out. The draws are seeded: the same values give the same.
     stream : int
         Trainings of two agents have nothing to do with one another: give them different numbers. Episodes are drawn alike for all.
-
-    Returns
-    -------
-    Resampled
-        The draws are seeded: the same values give the same.
     """
     trainings, episodes = values.shape
     if trainings * episodes == 0:
@@ -83,22 +92,18 @@ def resample(values: Vector, stream: int = 0) -> Resampled:
         )
     defined = values[np.isfinite(values)]
     if len(defined) == 0 or defined.min() == defined.max():  # resampling has nothing to draw
-        only = float(defined[0]) if len(defined) else float("nan")
-        constant = np.full(RESAMPLES, only)
+        only = float(defined[0]) if len(defined) else math.nan
+        constant = np.full(resamples, only)
         return Resampled(only, only, constant, constant)
     mean, iqm = _statistics(values, np.ones((1, trainings)), np.ones((1, episodes)))
-    of_trainings = _draws(trainings, 1 + stream)
-    of_episodes = _draws(episodes, 0)
+    of_trainings = _draws(trainings, 1 + stream, resamples)
+    of_episodes = _draws(episodes, 0, resamples)
     blocks = [
         _statistics(values, of_trainings[k : k + _BLOCK], of_episodes[k : k + _BLOCK])
-        for k in range(0, RESAMPLES, _BLOCK)
+        for k in range(0, resamples, _BLOCK)
     ]
-    return Resampled(
-        float(mean[0]),
-        float(iqm[0]),
-        np.concatenate([block[0] for block in blocks]),
-        np.concatenate([block[1] for block in blocks]),
-    )
+    means, iqms = (np.concatenate(each) for each in zip(*blocks, strict=True))
+    return Resampled(float(mean[0]), float(iqm[0]), means, iqms)
 
 
 def share_estimate(happened: NDArray[np.bool_]) -> Estimate:
@@ -118,10 +123,10 @@ def share_estimate(happened: NDArray[np.bool_]) -> Estimate:
 
 
 @lru_cache(maxsize=8)
-def _draws(size: int, stream: int) -> Vector:
-    """How often each of ``size`` things is drawn, for each resample: shape (RESAMPLES, size)."""
+def _draws(size: int, stream: int, resamples: int) -> Vector:
+    """How often each of ``size`` things is drawn, for each resample: shape (resamples, size)."""
     generator = np.random.default_rng((stream, size))
-    counts = generator.multinomial(size, np.full(size, 1.0 / size), size=RESAMPLES).astype(float)
+    counts = generator.multinomial(size, np.full(size, 1.0 / size), size=resamples).astype(float)
     counts.flags.writeable = False
     return counts
 
@@ -148,7 +153,7 @@ def _statistics(values: Vector, of_trainings: Vector, of_episodes: Vector) -> tu
 def _estimate(value: float, drawn: Vector) -> Estimate:
     found = drawn[np.isfinite(drawn)]
     if not np.isfinite(value) or len(found) == 0:
-        return Estimate(float("nan"), float("nan"), float("nan"))
+        return UNDEFINED
     tail = 0.5 * (1.0 - CONFIDENCE)
     low, high = np.quantile(found, (tail, 1.0 - tail))
     return Estimate(float(value), float(low), float(high))

@@ -10,9 +10,9 @@ import os
 import signal
 import time
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -23,11 +23,14 @@ from tqdm import tqdm
 import lean_yaw_env
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.files import written_whole
+from lean_yaw_env.reporting import uninterrupted
 from lean_yaw_env.validation import require_count
 
+from ..agent import Agent
 from ..policies.policy import package_versions
-from ..policies.policy_files import CARD_FILE, WEIGHTS_FILE, options_to_plain
+from ..policies.policy_files import CARD_FILE, WEIGHTS_FILE, load, options_to_plain
 from ..registry import (
+    AGENTS,
     AgentRequest,
     agent_entry,
     env_id_of,
@@ -35,49 +38,38 @@ from ..registry import (
     names_for,
     policy_folders,
 )
-from ..seeds import MOST_EPISODES, evaluation_seed
+from ..seeds import MOST_EPISODES, EpisodeSet, first_seed
+from .entries import is_entry, load_entry, read_entry
 from .episodes import Episodes, Results
-from .scoring import Progress, run_seeds
+from .scoring import run_seeds
 
-COSTLY_EPISODES = 40
-"""Of an agent that plans at every step, at most, where nothing else is asked for."""
 _CHUNK = 1024  # episodes run side by side
 _COSTLY_CHUNK = 20  # of an agent that plans: some tens of seconds
 _WORTH_PROCESSES = 2048  # episodes; fewer are run before another process has started
 _METRIC = "metric:"
+_Outcome = tuple[Episodes, float]
+"""Episodes and the seconds that they took."""
 # Folders of the walker's package that no episode depends on
 _ASIDE = frozenset({"agents", "cli", "multibody", "paper", "rendering", "vehicles"})
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """An agent that is to run a task's episodes.
-
-    Attributes
-    ----------
-    task, agent : str
-    episodes : 1 to ``MOST_EPISODES``
-    options : the environment's
-    folders : of its trained policies, one for each training; (None,) for an agent that is not trained
-    """
+    """An agent that is to run a task's episodes, 1 to ``MOST_EPISODES`` of them."""
 
     task: str
     agent: str
     episodes: int
     options: EnvOptions
     folders: tuple[Path | None, ...] = (None,)
+    """Of its trained policies, one for each training; (None,) for an agent that is not trained."""
+    entry: Path | None = None
+    """Folder of an agent from outside the package."""
+    made_for: EnvOptions | None = None
+    """Options that the agent is made for, where they are other ones than the environment's."""
 
     def __post_init__(self) -> None:
         require_count("episodes", self.episodes, 1, MOST_EPISODES)
-
-
-@dataclass(frozen=True)
-class CandidateResults:
-    """A candidate's results and the time they took, in seconds of one core."""
-
-    candidate: Candidate
-    results: Results
-    seconds: float
 
 
 @dataclass(frozen=True)
@@ -95,8 +87,9 @@ class _Chunk:
             "task": candidate.task,
             "agent": candidate.agent,
             "options": options_to_plain(candidate.options),
+            "made_for": candidate.made_for and options_to_plain(candidate.made_for),
             "seeds": [self.seeds.start, self.seeds.stop],
-            "policy": None if self.folder is None else _policy_digest(self.folder),
+            "policy": _policy_digest(candidate.entry, self.folder),
             "code": _code_digest(),
             "versions": package_versions(),
         }
@@ -106,36 +99,34 @@ class _Chunk:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What is to be evaluated, and how.
-
-    Attributes
-    ----------
-    episodes : of each agent, for each of its trainings
-    costly_episodes : of an agent that plans, at most: the first of the others'
-    seed : int >= 0
-        Another draws other episodes.
-    options : the environment's
-    path : folder of the one trained agent that is wanted, optional
-    runs : where trainings left their folders; None for the trained agents that come with the package, all of their trainings
-    cache : where finished episodes are kept, optional
-    processes : int >= 1
-    progress : show a bar
-    """
+    """What is to be evaluated, and how."""
 
     episodes: int = 1000
-    costly_episodes: int = COSTLY_EPISODES
+    """Of each agent, for each of its trainings."""
+    costly_episodes: int = 40
+    """Of an agent that plans, at most: the first of the others'."""
+    episode_set: EpisodeSet = "validation"
     seed: int = 0
+    """Another draws other episodes."""
     options: EnvOptions = field(default_factory=EnvOptions)
     path: Path | None = None
+    """Folder of the one trained agent that is wanted."""
     runs: Path | None = Path("runs")
+    """Where trainings left their folders; None for the trained agents that come with the package, all of their trainings."""
     cache: Path | None = None
+    """Where finished episodes are kept. They are not run again as long as task, options, episodes, agent and code are the same."""
     processes: int = 1
     progress: bool = True
+    """Show a bar."""
+
+    def __post_init__(self) -> None:
+        require_count("processes", self.processes, 1, 1024)
 
     def candidates(self, tasks: Sequence[str], names: Sequence[str]) -> list[Candidate]:
         """Agents of the registry for tasks; all that there are for a task, in the registry's order, if none is named.
 
-        Of several tasks, an agent that is not for one is left out there; of one task that is an error.
+        Of several tasks, an agent that is not for one is left out there; of one task that is an error. ``path`` may be a policy's folder, which
+        then stands for its algorithm's agent, or an entry's, which is added.
 
         Raises
         ------
@@ -144,102 +135,82 @@ class Evaluation:
         """
         for name in names:
             agent_entry(name)
+        entry = read_entry(self.path) if self.path is not None and is_entry(self.path) else None
+        path = self.path if entry is None else None
+        own = None if path is None or names else load(path).card
         found: list[Candidate] = []
         for task in tasks:
-            request = AgentRequest(
-                env_id_of(task), self.options, seed=self.seed, path=self.path, runs=self.runs
-            )
-            there = names_for(request)
+            env_id = env_id_of(task)
+            request = AgentRequest(env_id, self.options, seed=self.seed, runs=self.runs)
+            of_folder = replace(request, path=path)
+            there = names_for(of_folder if names else request)
+            if own is not None and own.env_id == env_id:
+                there = tuple(dict.fromkeys((*there, own.algorithm)))
             chosen = [name for name in dict.fromkeys(names) if len(tasks) == 1 or name in there]
-            found += [self._candidate(name, task, request) for name in (chosen if names else there)]
+            for name in chosen if names else there:
+                is_own = own is not None and (name, env_id) == (own.algorithm, own.env_id)
+                found.append(self._candidate(name, task, of_folder if names or is_own else request))
+            if entry is not None and task in entry.tasks:
+                found.append(
+                    Candidate(task, entry.name, self.episodes, self.options, entry.trainings, entry.folder)
+                )  # fmt: skip
         return found
 
     def _candidate(self, name: str, task: str, request: AgentRequest) -> Candidate:
-        kind = agent_entry(name).kind
-        episodes = self.episodes
-        if kind == "planner":
-            episodes = min(episodes, self.costly_episodes)
-        folders = policy_folders(name, request) if kind == "learned" else []
+        episodes = min(self.episodes, self.costly_episodes) if _plans(name) else self.episodes
+        is_learned = agent_entry(name).kind == "learned"
+        folders = policy_folders(name, request) if is_learned else []
         return Candidate(task, name, episodes, self.options, tuple(folders) or (None,))
 
-    def run(self, candidates: Sequence[Candidate]) -> list[CandidateResults]:
-        """Run the candidates' episodes; see ``run_all``."""
-        total = sum(candidate.episodes * len(candidate.folders) for candidate in candidates)
+    def run(self, candidates: Sequence[Candidate]) -> list[Results]:
+        """Let every candidate run the episodes of the seed; the same ones at the same task.
+
+        Raises
+        ------
+        ValueError
+            If a number is out of range, or an agent cannot be made.
+        """
+        chunks = {candidate: self._chunks(candidate) for candidate in candidates}
+        everything = [chunk for of_one in chunks.values() for chunk in of_one]
+        if self.cache is not None:
+            self.cache.mkdir(parents=True, exist_ok=True)
+        total = sum(len(chunk.seeds) for chunk in everything)
+        found: dict[_Chunk, _Outcome] = {}
         with tqdm(total=total, desc="evaluating", unit="episode", disable=not self.progress) as bar:
-            return run_all(
-                candidates,
-                seed=self.seed,
-                cache=self.cache,
-                processes=self.processes,
-                progress=bar.update,
-            )
+            for chunk, outcome in _outcomes(everything, self.cache, self.processes):
+                found[chunk] = outcome
+                bar.update(len(chunk.seeds))
+        return [_gathered(candidate, chunks[candidate], found) for candidate in candidates]
+
+    def _chunks(self, candidate: Candidate) -> list[_Chunk]:
+        size = _COSTLY_CHUNK if _plans(candidate.agent) else _CHUNK
+        first = first_seed(self.episode_set, self.seed)
+        seeds = range(first, first + candidate.episodes)
+        return [
+            _Chunk(candidate, folder, seeds[start : start + size])
+            for folder in candidate.folders
+            for start in range(0, len(seeds), size)
+        ]
 
 
-def run_all(
-    candidates: Sequence[Candidate],
-    *,
-    seed: int = 0,
-    cache: Path | None = None,
-    processes: int = 1,
-    progress: Progress | None = None,
-) -> list[CandidateResults]:
-    """Let every candidate run the episodes of an evaluation's seed; the same ones at the same task.
-
-    Parameters
-    ----------
-    candidates : Candidate
-    seed : int >= 0
-        Another seed draws other episodes.
-    cache : folder, optional
-        What is found there is not run again, and what is run is left there: it is found as long as task, options, episodes, agent and
-        code are the same.
-    processes : int >= 1
-    progress : called with numbers of episodes that are there, optional
-
-    Raises
-    ------
-    ValueError
-        If a number is out of range, or an agent cannot be made.
-    """
-    require_count("processes", processes, 1, 1024)
-    chunks = [
-        chunk for candidate in candidates for chunk in _chunks(candidate, evaluation_seed(seed))
-    ]
-    if cache is not None:
-        cache.mkdir(parents=True, exist_ok=True)
-    found: dict[_Chunk, tuple[Episodes, float]] = {}
-    for chunk, outcome in _outcomes(chunks, cache, processes):
-        found[chunk] = outcome
-        if progress is not None:
-            progress(len(chunk.seeds))
-    return [_gathered(candidate, evaluation_seed(seed), found) for candidate in candidates]
+def _plans(agent: str) -> bool:
+    return agent in AGENTS and AGENTS[agent].kind == "planner"
 
 
 def _gathered(
-    candidate: Candidate, first: int, found: dict[_Chunk, tuple[Episodes, float]]
-) -> CandidateResults:
-    chunks = _chunks(candidate, first)
-    runs = [
+    candidate: Candidate, chunks: Sequence[_Chunk], found: Mapping[_Chunk, _Outcome]
+) -> Results:
+    runs = tuple(
         Episodes.joined([found[chunk][0] for chunk in chunks if chunk.folder == folder])
         for folder in candidate.folders
-    ]
-    results = Results(candidate.task, candidate.agent, tuple(runs))
-    return CandidateResults(candidate, results, sum(found[chunk][1] for chunk in chunks))
-
-
-def _chunks(candidate: Candidate, first: int) -> list[_Chunk]:
-    size = _COSTLY_CHUNK if agent_entry(candidate.agent).kind == "planner" else _CHUNK
-    seeds = range(first, first + candidate.episodes)
-    return [
-        _Chunk(candidate, folder, seeds[start : start + size])
-        for folder in candidate.folders
-        for start in range(0, len(seeds), size)
-    ]
+    )
+    seconds = sum(found[chunk][1] for chunk in chunks)
+    return Results(candidate.task, candidate.agent, runs, candidate.options, seconds)
 
 
 def _outcomes(
     chunks: Sequence[_Chunk], cache: Path | None, processes: int
-) -> Iterator[tuple[_Chunk, tuple[Episodes, float]]]:
+) -> Iterator[tuple[_Chunk, _Outcome]]:
     """Each chunk's episodes and seconds, as they are there: the kept ones first."""
     waiting: list[_Chunk] = []
     for chunk in chunks:
@@ -249,16 +220,15 @@ def _outcomes(
         else:
             yield chunk, kept
     # plans take longest: begun last, one of them would be waited for while the other processes have nothing to do
-    waiting.sort(key=lambda chunk: agent_entry(chunk.candidate.agent).kind != "planner")
-    costly = any(agent_entry(chunk.candidate.agent).kind == "planner" for chunk in waiting)
-    if processes == 1 or not (
-        costly or sum(len(chunk.seeds) for chunk in waiting) >= _WORTH_PROCESSES
-    ):
+    waiting.sort(key=lambda chunk: not _plans(chunk.candidate.agent))
+    is_long = sum(len(chunk.seeds) for chunk in waiting) >= _WORTH_PROCESSES
+    if processes == 1 or not (is_long or (waiting and _plans(waiting[0].candidate.agent))):
         for chunk in waiting:
             yield chunk, _run_chunk(chunk, cache)
         return
     with _pool(min(processes, len(waiting))) as pool:
-        futures = {pool.submit(_run_chunk, chunk, cache): chunk for chunk in waiting}
+        with uninterrupted():
+            futures = {pool.submit(_run_chunk, chunk, cache): chunk for chunk in waiting}
         for future in as_completed(futures):
             yield futures[future], future.result()
 
@@ -266,61 +236,47 @@ def _outcomes(
 @contextlib.contextmanager
 def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     """Processes of one thread each; at an interruption what has begun ends and is kept, and nothing else begins."""
-    with _environment(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1"):
-        pool = ProcessPoolExecutor(
-            processes,
-            mp_context=multiprocessing.get_context("spawn"),
-            initializer=signal.signal,
-            initargs=(signal.SIGINT, signal.SIG_IGN),
-        )
-        try:
-            yield pool
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
-
-
-@contextlib.contextmanager
-def _environment(**variables: str) -> Iterator[None]:
-    """Variables that processes started meanwhile inherit."""
-    before = {name: os.environ.get(name) for name in variables}
-    os.environ.update(variables)
+    before = dict(os.environ)
+    os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
+    pool = ProcessPoolExecutor(
+        processes,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=signal.signal,
+        initargs=(signal.SIGINT, signal.SIG_IGN),
+    )
     try:
-        yield
+        yield pool
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        pool.shutdown(cancel_futures=True)
+        os.environ.clear()
+        os.environ.update(before)
 
 
-def _run_chunk(chunk: _Chunk, cache: Path | None) -> tuple[Episodes, float]:
+def make_candidate(candidate: Candidate, folder: Path | None, seed: int = 0) -> Agent:
+    """The agent of one of a candidate's trainings; ``seed`` is for an agent that draws."""
+    if candidate.entry is not None and folder is not None:
+        return load_entry(candidate.entry, folder)
+    options = candidate.options if candidate.made_for is None else candidate.made_for
+    request = AgentRequest(env_id_of(candidate.task), options, seed, folder, runs=None)
+    return make_agent(candidate.agent, request)
+
+
+def _run_chunk(chunk: _Chunk, cache: Path | None) -> _Outcome:
     """Run a chunk and keep it."""
     candidate = chunk.candidate
     # an agent that draws draws anew for each chunk, so that chunks may be run in any order
-    request = AgentRequest(
-        env_id_of(candidate.task),
-        candidate.options,
-        seed=chunk.seeds.start,
-        path=chunk.folder,
-        runs=None,
-    )
-    agent = make_agent(candidate.agent, request)
+    agent = make_candidate(candidate, chunk.folder, chunk.seeds.start)
     begin = time.process_time()
     episodes = run_seeds(agent, candidate.task, chunk.seeds, options=candidate.options)
     seconds = time.process_time() - begin
     if cache is not None:
-        _write(chunk.file(cache), episodes, seconds)
+        arrays: dict[str, Any] = {_METRIC + name: each for name, each in episodes.metrics.items()}
+        with written_whole(chunk.file(cache)) as temporary:
+            np.savez(temporary, survived=episodes.survived, seconds=np.array(seconds), **arrays)
     return episodes, seconds
 
 
-def _write(path: Path, episodes: Episodes, seconds: float) -> None:
-    arrays: dict[str, Any] = {_METRIC + name: each for name, each in episodes.metrics.items()}
-    with written_whole(path) as temporary:
-        np.savez(temporary, survived=episodes.survived, seconds=np.array(seconds), **arrays)
-
-
-def _read(path: Path) -> tuple[Episodes, float] | None:
+def _read(path: Path) -> _Outcome | None:
     """What is kept in a file; None if there is none or it is damaged."""
     try:
         with np.load(path, allow_pickle=False) as kept:
@@ -332,15 +288,6 @@ def _read(path: Path) -> tuple[Episodes, float] | None:
         return None
 
 
-@lru_cache(maxsize=256)
-def _policy_digest(folder: Path) -> str:
-    digest = hashlib.sha256()
-    for name in (CARD_FILE, WEIGHTS_FILE):
-        with contextlib.suppress(OSError):  # what is missing is told when the policy is loaded
-            digest.update((folder / name).read_bytes())
-    return digest.hexdigest()
-
-
 @lru_cache(maxsize=1)
 def _code_digest() -> str:
     """A digest of the code and settings that an episode depends on."""
@@ -349,9 +296,22 @@ def _code_digest() -> str:
         path for path in walker.rglob("*.py") if path.relative_to(walker).parts[0] not in _ASIDE
     ]
     files += [*own.glob("*.py"), *own.glob("*.json"), own / "evaluation" / "scoring.py"]
-    for folder in ("controllers", "policies"):
-        files += (own / folder).rglob("*.py")
+    files += [*(own / "controllers").rglob("*.py"), *(own / "policies").rglob("*.py")]
+    return _digest(*sorted(files))
+
+
+def _policy_digest(entry: Path | None, folder: Path | None) -> str | None:
+    """A digest of a trained policy's files, or of an entry's; None for an agent that is not trained."""
+    if entry is not None:
+        files = sorted(each for each in entry.rglob("*") if each.is_file())
+        return _digest(*(each for each in files if "__pycache__" not in each.parts)) + str(folder)
+    return None if folder is None else _digest(folder / CARD_FILE, folder / WEIGHTS_FILE)
+
+
+@lru_cache(maxsize=256)
+def _digest(*files: Path) -> str:
     digest = hashlib.sha256()
-    for path in sorted(files):
-        digest.update(path.read_bytes())
+    for path in files:
+        with contextlib.suppress(OSError):  # a policy's missing file is told when it is loaded
+            digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -6,14 +6,17 @@ import csv
 import io
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from .episodes import RETURN, Row, is_share
+from lean_yaw_env.envs.tasks import task_named
+
+from .episodes import SURVIVAL, Row, is_share
+from .intervals import Estimate
 
 _WIDTH = 5  # agents in a table: so many fit a terminal of 80 columns
 
@@ -30,8 +33,7 @@ def rows_to_plain(rows: Sequence[Row]) -> list[dict[str, str | int | float | Non
 
 
 def rows_to_json(rows: Sequence[Row]) -> str:
-    """A list of objects with the fields of ``Row``: task, agent, metric, mean, low, high, survival, episodes, iqm, ...; low and high are the
-    mean's."""
+    """A list of objects with the fields of ``Row``."""
     return json.dumps(rows_to_plain(rows), indent=2, allow_nan=False)
 
 
@@ -44,30 +46,18 @@ def rows_to_csv(rows: Sequence[Row]) -> str:
     return text.getvalue()
 
 
-def results_tables(rows: Sequence[Row]) -> list[Table]:
-    """Tables of each task, as ``results_table``, of a few agents each."""
-    tables: list[Table] = []
-    for task in dict.fromkeys(row.task for row in rows):
-        of_task = [row for row in rows if row.task == task]
-        agents = list(dict.fromkeys(row.agent for row in of_task))
-        for start in range(0, len(agents), _WIDTH):
-            shown = agents[start : start + _WIDTH]
-            tables.append(results_table([row for row in of_task if row.agent in shown]))
-    return tables
-
-
 def results_table(rows: Sequence[Row]) -> Table:
-    """A table of one task: a metric to a row, an agent to a column, each interquartile mean, or share, over its 95 % interval.
+    """A table of one task: a metric to a row, an agent to a column, each mean over its 95 % interval; the main metric, survival and the main
+    metric's interquartile mean come first.
 
-    Of the return the mean stands beside it. Below: what each agent is against the best feedback controller, by its means.
+    Below: what each agent is against the best feedback controller.
     """
-    metrics = list(dict.fromkeys(row.metric for row in rows))
     agents = list(dict.fromkeys(row.agent for row in rows))
     cells = {(row.agent, row.metric): row for row in rows}
-    task = rows[0].task
     counts = sorted({row.episodes for row in rows}, reverse=True)
+    task = rows[0].task
     table = Table(
-        title=f"{task}, {' or '.join(map(str, counts))} episodes: interquartile means, 95 % intervals",
+        title=f"{task}, {' or '.join(map(str, counts))} episodes: means, 95 % intervals",
         box=box.SIMPLE_HEAD,
         padding=(0, 0),
         pad_edge=False,
@@ -75,39 +65,46 @@ def results_table(rows: Sequence[Row]) -> Table:
     table.add_column("metric", width=16)  # five agents and it fit a terminal of 80 columns
     for agent in agents:
         table.add_column(agent, justify="right", no_wrap=True)
+
+    def add(metric: str, of: Callable[[Row], Estimate], words: str) -> None:
+        found = [cells.get((agent, metric)) for agent in agents]
+        table.add_row(words, *("" if row is None else _over_interval(of(row)) for row in found))
+
+    headline = task_named(task).headline
+    metrics = dict.fromkeys([headline, SURVIVAL, *(row.metric for row in rows)])
     for metric in metrics:
-        found = [cells.get((agent, metric)) for agent in agents]
-        whole = is_share(task, metric)
-        table.add_row(
-            metric.replace("_", " "),
-            *("" if row is None else cell(row, mean=whole) for row in found),
-        )
-        if metric == RETURN:
-            means = ("" if row is None else cell(row, mean=True) for row in found)
-            table.add_row("return, mean", *means)
-    compared = [row for row in rows if row.against is not None]
-    if compared:
+        add(metric, mean, metric.replace("_", " "))
+        if metric == SURVIVAL and not is_share(task, headline):
+            add(headline, iqm, f"{headline.replace('_', ' ')}, iqm")
+    rival = next((row.against for row in rows if row.verdict), None)
+    if rival is not None:
         table.add_section()
-    for metric in dict.fromkeys(row.metric for row in compared):
-        found = [cells.get((agent, metric)) for agent in agents]
-        table.add_row(
-            f"{metric.replace('_', ' ')}\nagainst {compared[0].against}",
-            *((row.verdict or "") if row is not None else "" for row in found),
-        )
+        verdicts = {row.agent: row.verdict for row in rows if row.verdict}
+        table.add_row(f"against {rival}", *(verdicts.get(agent, "") for agent in agents))
     return table
 
 
-def cell(row: Row, *, mean: bool) -> str:
-    """The mean, or the interquartile mean, over its interval."""
-    value, low, high = estimate(row, mean=mean)
-    if math.isnan(value):
-        return "undefined"
-    return f"{number(value)}\n{number(low)}–{number(high)}"
+def mean(row: Row) -> Estimate:
+    """A row's mean with its interval."""
+    return Estimate(row.mean, row.low, row.high)
 
 
-def estimate(row: Row, *, mean: bool) -> tuple[float, float, float]:
-    """The mean, or the interquartile mean, with its interval."""
-    return (row.mean, row.low, row.high) if mean else (row.iqm, row.iqm_low, row.iqm_high)
+def iqm(row: Row) -> Estimate:
+    """A row's interquartile mean with its interval; undefined for a share."""
+    return Estimate(row.iqm, row.iqm_low, row.iqm_high)
+
+
+def _over_interval(found: Estimate) -> str:
+    value, low, high = found
+    return "undefined" if math.isnan(value) else f"{number(value)}\n{number(low)}–{number(high)}"
+
+
+def bracketed(found: Estimate, *, signed: bool = False) -> str:
+    """A value with its interval in brackets; nothing if it is undefined."""
+    if math.isnan(found.value):
+        return ""
+    plus = "+" if signed and found.value > 0.0 else ""
+    return f"{plus}{number(found.value)} [{number(found.low)}, {number(found.high)}]"
 
 
 def number(value: float) -> str:
@@ -115,10 +112,22 @@ def number(value: float) -> str:
     return f"{value:.1f}" if abs(value) >= 10.0 else f"{value:.3f}"
 
 
+def markdown_table(
+    titles: Sequence[str], lines: Sequence[Sequence[str]], *, align_right: bool = False
+) -> str:
+    """A table in Markdown, all columns but the first aligned to the right if asked for."""
+    rule = ["---", *(["---:" if align_right else "---"] * (len(titles) - 1))]
+    return "\n".join("| " + " | ".join(line) + " |" for line in (titles, rule, *lines))
+
+
 def show(rows: Sequence[Row], console: Console, *, as_json: bool = False) -> None:
-    """Print rows, as tables or as JSON."""
+    """Print rows, as JSON or as tables of each task with a few agents each."""
     if as_json:
         console.print(rows_to_json(rows), soft_wrap=True, highlight=False, markup=False)
         return
-    for table in results_tables(rows):
-        console.print(table)
+    for task in dict.fromkeys(row.task for row in rows):
+        of_task = [row for row in rows if row.task == task]
+        agents = list(dict.fromkeys(row.agent for row in of_task))
+        for start in range(0, len(agents), _WIDTH):
+            shown = agents[start : start + _WIDTH]
+            console.print(results_table([row for row in of_task if row.agent in shown]))

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.simulation import Simulation
-from lean_yaw_env.envs.tasks import Task, task_named
+from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.validation import require_count
 
 from ..agent import Agent, State, attach
-from ..seeds import MOST_EPISODES, evaluation_seed
+from ..seeds import MOST_EPISODES, EpisodeSet, first_seed
 from .episodes import RETURN, SPEED, Episodes, Results, Row, summary
 
 _CHUNK = 1024  # walkers stepped together
@@ -30,29 +29,21 @@ def run_episodes(
     *,
     episodes: int,
     seed: int = 0,
+    episode_set: EpisodeSet = "validation",
     options: EnvOptions | None = None,
     progress: Progress | None = None,
 ) -> Episodes:
-    """Run an agent through episodes; which, depends on ``seed`` alone.
+    """Run an agent through episodes; which, depends on ``episode_set`` and ``seed`` alone.
 
     Parameters
     ----------
-    agent : Agent
-    task : str
-    episodes : 1 to ``MOST_EPISODES``
-    seed : int >= 0
-        Another seed draws other episodes.
-    options : EnvOptions
-        The environment's.
-    progress : called with the number of episodes that have just ended, optional
-
-    Raises
-    ------
-    ValueError
-        If a number is out of its range.
+    agent, task, options : who walks, at which task, under which options
+    episodes : 1 to ``MOST_EPISODES``, or ``ValueError``
+    seed : int >= 0, or ``ValueError``
+    progress : called with the number of episodes that have just ended
     """
     total = require_count("episodes", episodes, 1, MOST_EPISODES)
-    first = evaluation_seed(seed)
+    first = first_seed(episode_set, seed)
     return run_seeds(agent, task, range(first, first + total), options=options, progress=progress)
 
 
@@ -64,7 +55,7 @@ def run_seeds(
     options: EnvOptions | None = None,
     progress: Progress | None = None,
 ) -> Episodes:
-    """Run an agent through one episode for each environment seed; for episodes to judge it by, see ``run_episodes``."""
+    """Run an agent through one episode for each environment seed; for those of an evaluation, see ``run_episodes``."""
     parts = [
         _run_chunk(agent, task, seeds[start : start + _CHUNK], options, progress)
         for start in range(0, len(seeds), _CHUNK)
@@ -81,7 +72,7 @@ def evaluate(
     options: EnvOptions | None = None,
     progress: Progress | None = None,
 ) -> list[Row]:
-    """Run every agent through the same episodes; one row for each metric of each agent, ``survival`` last.
+    """Run every agent through the same validation episodes; one row for each metric of each agent, ``survival`` last.
 
     Raises
     ------
@@ -110,13 +101,13 @@ def _run_chunk(
     chosen = EnvOptions() if options is None else options
     task = task_named(task_name)
     n = len(seeds)
-    env = WalkerVectorEnv(n, task_name, step_info=False, copy=False, **_arguments(chosen))
+    env = WalkerVectorEnv(n, task_name, step_info=False, copy=False, **vars(chosen))
     observations, _ = env.reset(seed=list(seeds))
     attach(agent, env)
     ended = np.zeros(n, dtype=np.bool_)
     survived = np.zeros(n, dtype=np.bool_)
     returns = np.zeros(n)
-    metrics = {name: np.full(n, np.nan) for name in _metric_names(task)}
+    metrics = {name: np.full(n, np.nan) for name in (RETURN, *task.metrics, SPEED)}
     state: State = None
     starts = np.ones(n, dtype=np.bool_)
     while not ended.all():
@@ -127,19 +118,17 @@ def _run_chunk(
         now = starts & ~ended
         if now.any():
             # the default autoreset mode keeps an ended episode's memory until the next step
-            for name, values in _metrics(env.simulation, now).items():
+            found = _metrics(env.simulation, now)
+            for name, values in found.items():
                 metrics[name][now] = values
-            survived[now] = truncated[now]
+            # a success may end an episode too
+            survived[now] = truncated[now] | (found.get("is_success", np.zeros(1)) > 0.0)
             ended |= now
             if progress is not None:
                 progress(int(now.sum()))
     env.close()
     metrics[RETURN] = returns
     return Episodes(survived, metrics)
-
-
-def _metric_names(task: Task) -> tuple[str, ...]:
-    return (RETURN, *task.metrics, SPEED)
 
 
 def _metrics(simulation: Simulation, ended: NDArray[np.bool_]) -> dict[str, Vector]:
@@ -149,8 +138,3 @@ def _metrics(simulation: Simulation, ended: NDArray[np.bool_]) -> dict[str, Vect
     time = walkers["time"]
     nowhere = np.full(len(time), np.nan)
     return found | {SPEED: np.divide(walkers["distance"], time, out=nowhere, where=time > 0.0)}
-
-
-def _arguments(options: EnvOptions) -> dict[str, Any]:
-    """Options as an environment's keyword arguments."""
-    return dict(vars(options))

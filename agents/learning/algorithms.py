@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import torch
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.registration import ALL_TASKS, GOAL_TASK, TASK_VERSIONS
@@ -16,9 +19,9 @@ from ..policies.policy_files import task_of
 from ..settings import tuned
 from .apg import GradientLearner, GradientSettings
 from .her import HERLearner, HERSettings
-from .learner import LearnerSettings, MakeLearner, settings_to_plain, torch_threads
+from .learner import Learner, LearnerSettings, settings_to_plain
 from .ppo import PPOLearner, PPOSettings
-from .recorder import Recorder, Report, TrainingLog
+from .recorder import CheckpointError, Recorder, Report, TrainingLog
 from .sac import SACLearner, SACSettings
 
 
@@ -32,17 +35,10 @@ class Trained:
 
 @dataclass(frozen=True)
 class Algorithm:
-    """What a training needs to know of an algorithm.
-
-    Attributes
-    ----------
-    settings : class of its settings, a ``LearnerSettings``
-    make : its learner's class
-    tasks : that it can learn
-    """
+    """An algorithm: the class of its settings, a ``LearnerSettings``; its learner's class; and the tasks that it can learn."""
 
     settings: type[Any]
-    make: MakeLearner
+    make: Callable[..., Learner]
     tasks: tuple[str, ...] = ALL_TASKS
 
 
@@ -68,12 +64,6 @@ def settings_for(algorithm: str, task: str) -> Any:
     return tuned(algorithm, task, entry.settings())
 
 
-def settings_from_plain(algorithm: str, plain: dict[str, Any]) -> Any:
-    """The settings that ``learner.settings_to_plain`` wrote, or ``TypeError`` or ``ValueError``."""
-    values = {k: tuple(v) if isinstance(v, list) else v for k, v in plain.items()}
-    return ALGORITHMS[require_choice("algorithm", algorithm, ALGORITHMS)].settings(**values)
-
-
 def train(
     algorithm: str,
     env_id: str,
@@ -88,20 +78,19 @@ def train(
     report: Report | None = None,
     tensorboard: Path | None = None,
 ) -> Trained:
-    """Train a policy, going on from the checkpoint if its file is there.
+    """Train a policy, from the checkpoint on if its file is there.
 
-    Interrupted and gone on with the same arguments, a training gives what it would have given uninterrupted, bit for bit.
+    A training that was interrupted and is resumed with the same arguments returns what it would have returned uninterrupted, bit for bit.
 
     Parameters
     ----------
     algorithm : a name in ``ALGORITHMS``
     env_id, settings, seed, options : what to train
-    checkpoint : file for the training's state, written whole; none without
-    checkpoint_seconds : least time between two of them
+    checkpoint : file for the training's state, written every ``checkpoint_seconds`` or less often; None for none
     threads : of torch and of the walkers
     progress : show a bar
-    report : told of the steps done and the latest returns, between updates
-    tensorboard : folder for TensorBoard's logs; none without
+    report : called between updates
+    tensorboard : folder for TensorBoard's logs; None for none
 
     Raises
     ------
@@ -111,10 +100,13 @@ def train(
         If the checkpoint is damaged or another training's.
     """
     chosen = EnvOptions() if options is None else options
-    with torch_threads(threads):
-        learner = ALGORITHMS[require_choice("algorithm", algorithm, ALGORITHMS)].make(
-            env_id, settings, seed, chosen, threads, tensorboard
-        )
+    entry = ALGORITHMS[require_choice("algorithm", algorithm, ALGORITHMS)]
+    before = torch.get_num_threads()
+    torch.set_num_threads(
+        threads
+    )  # torch's own default, one for each core, makes small networks slower
+    try:
+        learner = entry.make(env_id, settings, seed, chosen, threads, tensorboard)
         recorder = Recorder(
             settings.steps,
             learner.capture,
@@ -124,15 +116,16 @@ def train(
             label=f"training, seed {seed}",
             report=report,
         )
-        saved = recorder.saved()
-        if saved is not None:
-            learner.restore(saved)
-        recorder.start(learner.steps)
-        try:
+        recorder.resume(learner.restore)
+        if not 0 <= learner.steps < settings.steps + settings.update_steps:
+            raise CheckpointError(
+                f"the checkpoint is of {learner.steps:,} steps, and the training ends at {settings.steps:,}"
+            )
+        with recorder.running(learner.steps):
             learner.learn(recorder)
-            recorder.finish(learner.steps)
-        finally:
-            recorder.close()
+            recorder.between_updates(learner.steps, last=True)
+    finally:
+        torch.set_num_threads(before)
     log = recorder.log()
     card = PolicyCard(
         env_id=env_id,

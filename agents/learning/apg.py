@@ -11,7 +11,9 @@ import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -25,9 +27,9 @@ from lean_yaw_env.validation import require_number
 
 from ..policies.policy_files import task_of
 from ..seeds import training_seed
-from .differentiable import DifferentiableWalkers, Walked, Window, time_discounted_returns
-from .learner import LearnerSettings, optimizer_arrays, restore_optimizer
-from .recorder import Arrays, EndedEpisode, Recorder, restoring, under
+from .differentiable import DifferentiableWalkers, Steps, time_discounted_returns
+from .learner import LearnerSettings, captured, float_array, restore
+from .recorder import EndedEpisode, Recorder, State, require_like
 
 _LAST_LAYER = 0.01
 """Scale of a policy's last layer at first: it begins near the gait's own command."""
@@ -66,6 +68,10 @@ class GradientSettings(LearnerSettings):
     exploration: float = 0.05
     largest_gradient: float = 1.0
 
+    @property
+    def update_steps(self) -> int:
+        return self.walkers * self.window
+
     def __post_init__(self) -> None:
         super().__post_init__()
         self.require_counts("window", "critic_epochs", "critic_batches")
@@ -73,10 +79,9 @@ class GradientSettings(LearnerSettings):
         self.require_shares("critic_memory", "trace")
         self.require_positive("critic_learning_rate", "largest_gradient")
         require_number("exploration", self.exploration, 0.0, 10.0, "(]")
-        samples = self.walkers * self.window
-        if samples % self.critic_batches:
+        if self.update_steps % self.critic_batches:
             raise ValueError(
-                f"critic_batches must divide the {samples} samples of a window, got {self.critic_batches}"
+                f"critic_batches must divide the {self.update_steps} samples of a window, got {self.critic_batches}"
             )
 
 
@@ -99,18 +104,25 @@ class GradientLearner:
         self._tensorboard = tensorboard
         self.steps = 0
         self.generator = torch.Generator().manual_seed(seed)
+        walking = settings.training_options(options)
         self.walkers = DifferentiableWalkers(
-            task_of(env_id), settings.walked_under(options), settings.walkers, threads=threads
+            task_of(env_id), walking, settings.walkers, threads=threads
         )
         features = self.walkers.reset(training_seed(seed)).shape[1]
-        self.policy = make_policy(features, ACTION_SIZE, settings.hidden, self.generator)
-        self.critic = Critic(features, settings.hidden, self.generator)
+        self.policy = perceptron(
+            features, settings.hidden, ACTION_SIZE, _LAST_LAYER, self.generator
+        )
+        self.critic = perceptron(features, settings.hidden, 1, 1.0, self.generator)
+        """What is still to be earned from an observation, in units of a rate of one over the time constant."""
         self.target = copy.deepcopy(self.critic).requires_grad_(False)
-        self.policy_optimizer = _adam(self.policy, settings.learning_rate)
-        self.critic_optimizer = _adam(self.critic, settings.critic_learning_rate)
+        self.networks = {"policy": self.policy, "critic": self.critic, "target": self.target}
+        self.optimizers = {
+            "policy_optimizer": Adam(self.policy.parameters(), betas=_BETAS, fused=True),
+            "critic_optimizer": Adam(self.critic.parameters(), betas=_BETAS, fused=True),
+        }
 
     def learn(self, recorder: Recorder) -> None:
-        """Train to the end; see ``Learner``."""
+        """Train to the end."""
         writer = None if self._tensorboard is None else SummaryWriter(str(self._tensorboard))
         while self.steps < self.settings.steps:
             ended = self.update()
@@ -123,169 +135,102 @@ class GradientLearner:
             writer.close()
 
     def weights(self) -> dict[str, NDArray[np.float32]]:
-        """The policy's numbers. Observations come scaled already: their statistics are those that change nothing."""
+        """The policy's weights. Observations come scaled already: their statistics are those that change nothing."""
         features = self.walkers.observations.shape[1]
-        deviation = math.log(self.settings.exploration)
-        return layer_weights(self.policy) | {
+        layers = [layer for layer in self.policy if isinstance(layer, nn.Linear)]
+        weights = {
+            f"layers.{k}.{part}": float_array(getattr(layer, part))
+            for k, layer in enumerate(layers)
+            for part in ("weight", "bias")
+        }
+        return weights | {
             "observation_mean": np.zeros(features, dtype=np.float32),
             "observation_variance": np.ones(features, dtype=np.float32),
-            "log_std": np.full(ACTION_SIZE, deviation, dtype=np.float32),
+            "log_std": np.full(ACTION_SIZE, math.log(self.settings.exploration), dtype=np.float32),
         }
 
     def update(self) -> list[EndedEpisode]:
         """Walk a window, improve policy and critic by it, and return the episodes that ended in it."""
-        self._set_learning_rates()
+        settings, constant = self.settings, self.settings.time_constant
+        share = settings.learning_rate_share(max(0.0, 1.0 - self.steps / settings.steps))
         window, ended = self._walk()
-        next_values = self.target(window.next_observations.float())
-        constant = self.settings.time_constant
+        next_values = self.target(window.observations.float()).squeeze(-1)
         returns = time_discounted_returns(
-            window, constant * next_values.double(), constant, self.settings.trace
+            window, constant * next_values.double(), constant, settings.trace
         )
-        if self.steps > self.settings.critic_first:
-            self._descend(self.policy_optimizer, self.policy, -returns.mean() / constant)
-        self._improve_critic(window, returns.detach())
+        if self.steps > settings.critic_first:
+            self._descend("policy", -returns.mean() / constant, share * settings.learning_rate)
+        self._improve_critic(window, returns.detach(), share * settings.critic_learning_rate)
         return ended
 
-    def capture(self) -> Arrays:
-        """All that decides how the training goes on, between two updates."""
-        arrays: Arrays = {
-            "count.steps": np.array(self.steps),
-            "random.torch": self.generator.get_state().numpy(),
-        }
-        for name, network in self._networks().items():
-            arrays |= {f"{name}.{k}": v.numpy().copy() for k, v in network.state_dict().items()}
-        for name, optimizer in self._optimizers().items():
-            arrays |= {f"{name}.{k}": v for k, v in optimizer_arrays(optimizer).items()}
-        return arrays | {f"walkers.{k}": v for k, v in self.walkers.snapshot().items()}
-
-    def restore(self, arrays: Arrays) -> None:
-        """Bring a learner that was made with the same settings to a captured state, or raise ``CheckpointError``."""
-        with restoring():
-            for name, network in self._networks().items():
-                network.load_state_dict(
-                    {k: torch.from_numpy(arrays[f"{name}.{k}"]) for k in network.state_dict()}
-                )
-            for name, optimizer in self._optimizers().items():
-                restore_optimizer(optimizer, under(f"{name}.", arrays))
-            self.walkers.restore(under("walkers.", arrays))
-            self.steps = int(arrays["count.steps"])
-            self.generator.set_state(torch.from_numpy(arrays["random.torch"].copy()))
-
-    def _networks(self) -> dict[str, nn.Module]:
-        return {"policy": self.policy, "critic": self.critic, "target": self.target}
-
-    def _optimizers(self) -> dict[str, Adam]:
+    def capture(self) -> State:
+        """Networks, optimisers, walkers and random numbers."""
         return {
-            "policy_optimizer": self.policy_optimizer,
-            "critic_optimizer": self.critic_optimizer,
+            **captured(self.networks, self.optimizers),
+            "walkers": self.walkers.snapshot(),
+            "steps": self.steps,
+            "torch": self.generator.get_state(),
         }
 
-    def _walk(self) -> tuple[Window, list[EndedEpisode]]:
-        """A window of steps by the policy, explored around."""
+    def restore(self, state: Any) -> None:
+        """Bring the learner to a captured state."""
+        require_like(self.capture(), state)
+        restore(self.networks, self.optimizers, state)
+        self.walkers.restore(state["walkers"])
+        self.steps = int(state["steps"])
+        self.generator.set_state(torch.from_numpy(state["torch"]))
+
+    def _walk(self) -> tuple[Steps, list[EndedEpisode]]:
+        """A window of steps by the policy with exploration, and the episodes that ended in it."""
         self.walkers.cut()
-        observations: list[Tensor] = []
-        steps: list[Walked] = []
+        steps: list[Steps] = []
         ended: list[EndedEpisode] = []
         for _ in range(self.settings.window):
-            observed = self.walkers.observations
-            walked = self.walkers.step(self._act(observed))
+            means = self.policy(self.walkers.observations.float())
+            noise = torch.randn(means.shape, generator=self.generator)
+            step = self.walkers.step((means + self.settings.exploration * noise).double())
             self.steps += self.settings.walkers
-            observations.append(observed)
-            steps.append(walked)
-            ended += _ended(walked, self.steps)
-        return Window.of(observations, steps), ended
+            steps.append(step)
+            for i in torch.nonzero(step.terminated | step.truncated).flatten().tolist():
+                row: Any = [each[i].item() for each in (step.returns, step.lengths, step.truncated)]
+                ended.append(EndedEpisode(self.steps, *row))
+        return Steps(*map(torch.stack, zip(*steps, strict=True))), ended
 
-    def _act(self, observed: Tensor) -> Tensor:
-        """The policy's actions (n, 2), and what is added to them to explore."""
-        means = self.policy(observed.float())
-        noise = torch.randn(means.shape, generator=self.generator)
-        return (means + self.settings.exploration * noise).double()
-
-    def _improve_critic(self, window: Window, returns: Tensor) -> None:
-        """Bring the critic nearer to the returns, and the target nearer to the critic."""
-        observations = window.observations.detach().float().flatten(0, 1)
+    def _improve_critic(self, window: Steps, returns: Tensor, learning_rate: float) -> None:
+        """Move the critic towards the returns, and the target towards the critic."""
+        observations = window.before.detach().float().flatten(0, 1)
         wanted = (returns / self.settings.time_constant).float().flatten()
         for _ in range(self.settings.critic_epochs):
             order = torch.randperm(len(wanted), generator=self.generator)
             for rows in order.chunk(self.settings.critic_batches):
-                loss = nn.functional.mse_loss(self.critic(observations[rows]), wanted[rows])
-                self._descend(self.critic_optimizer, self.critic, loss)
+                found = self.critic(observations[rows]).squeeze(-1)
+                self._descend("critic", nn.functional.mse_loss(found, wanted[rows]), learning_rate)
         with torch.no_grad():
             share = 1.0 - self.settings.critic_memory
             for kept, new in zip(self.target.parameters(), self.critic.parameters(), strict=True):
                 kept.lerp_(new, share)
 
-    def _descend(self, optimizer: Adam, network: nn.Module, loss: Tensor) -> None:
+    def _descend(self, network: str, loss: Tensor, learning_rate: float) -> None:
+        optimizer = self.optimizers[f"{network}_optimizer"]
+        for group in optimizer.param_groups:
+            group["lr"] = learning_rate
         optimizer.zero_grad()
         loss.backward()
-        nn.utils.clip_grad_norm_(network.parameters(), self.settings.largest_gradient)
+        limit = self.settings.largest_gradient
+        nn.utils.clip_grad_norm_(self.networks[network].parameters(), limit)
         optimizer.step()
-
-    def _set_learning_rates(self) -> None:
-        """Both learning rates fall linearly to a share of themselves."""
-        last, settings = self.settings.final_learning_rate, self.settings
-        share = last + (1.0 - last) * max(0.0, 1.0 - self.steps / settings.steps)
-        for optimizer, first in (
-            (self.policy_optimizer, settings.learning_rate),
-            (self.critic_optimizer, settings.critic_learning_rate),
-        ):
-            for group in optimizer.param_groups:
-                group["lr"] = share * first
-
-
-def _adam(network: nn.Module, learning_rate: float) -> Adam:
-    return Adam(network.parameters(), learning_rate, _BETAS, fused=True)
-
-
-def _ended(walked: Walked, steps: int) -> list[EndedEpisode]:
-    """The episodes that a step ended."""
-    return [
-        EndedEpisode(
-            steps, float(walked.returns[i]), int(walked.lengths[i]), bool(walked.truncated[i])
-        )
-        for i in torch.nonzero(walked.terminated | walked.truncated).flatten().tolist()
-    ]
 
 
 def perceptron(
     inputs: int, hidden: Sequence[int], outputs: int, last: float, generator: torch.Generator
 ) -> nn.Sequential:
-    """A perceptron with tanh between its layers, begun orthogonally, the last layer scaled by ``last``."""
+    """A perceptron with tanh between its layers and orthogonal initial weights, the last layer's scaled by ``last``."""
     sizes = [inputs, *hidden, outputs]
     layers: list[nn.Module] = []
-    for k in range(len(sizes) - 1):
-        is_last = k == len(sizes) - 2
-        layer = nn.Linear(sizes[k], sizes[k + 1])
-        gain = last if is_last else math.sqrt(2.0)
-        nn.init.orthogonal_(layer.weight, gain, generator=generator)
+    for k, (before, after) in enumerate(pairwise(sizes)):
+        layer = nn.Linear(before, after)
+        is_last = k == len(hidden)
+        nn.init.orthogonal_(layer.weight, last if is_last else math.sqrt(2.0), generator=generator)
         nn.init.zeros_(layer.bias)
         layers += [layer] if is_last else [layer, nn.Tanh()]
     return nn.Sequential(*layers)
-
-
-def make_policy(
-    features: int, actions: int, hidden: Sequence[int], generator: torch.Generator
-) -> nn.Sequential:
-    """A network from observations to actions, which are clipped by who takes them."""
-    return perceptron(features, hidden, actions, _LAST_LAYER, generator)
-
-
-class Critic(nn.Module):
-    """What is still to be earned from an observation (..., features), in units of a rate of one over the time constant."""
-
-    def __init__(self, features: int, hidden: Sequence[int], generator: torch.Generator) -> None:
-        super().__init__()
-        self.network = perceptron(features, hidden, 1, 1.0, generator)
-
-    def forward(self, observations: Tensor) -> Tensor:
-        return self.network(observations).squeeze(-1)
-
-
-def layer_weights(policy: nn.Sequential) -> dict[str, NDArray[np.float32]]:
-    """A policy's weights by the names of ``agents.policies.Policy``."""
-    layers = [layer for layer in policy if isinstance(layer, nn.Linear)]
-    return {
-        f"layers.{k}.{name}": tensor.detach().numpy().copy()
-        for k, layer in enumerate(layers)
-        for name, tensor in (("weight", layer.weight), ("bias", layer.bias))
-    }

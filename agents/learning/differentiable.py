@@ -1,4 +1,4 @@
-"""Walkers at a task whose steps gradients flow through: the compiled environment walks, its exact Jacobians lead back."""
+"""Walkers at a task whose steps are differentiable: the compiled environment walks, and its exact Jacobians carry the gradients back."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from torch import Tensor
 from torch.autograd import Function
 from torch.autograd.function import once_differentiable
 
-from lean_yaw_env.envs.derivatives import FOLLOWED
-from lean_yaw_env.envs.linearised import LinearisedSteps
+from lean_yaw_env.envs.derivatives import FOLLOWED, LinearisedSteps
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.sb3 import WalkerVecEnv
 from lean_yaw_env.registration import TASK_VERSIONS
@@ -22,18 +21,22 @@ from lean_yaw_env.validation import require_choice
 _OFFSET = FOLLOWED.index("mass_offset")
 
 
-class Walked(NamedTuple):
-    """What came of a step, with gradients; each of shape (n,), but for observations.
+class Steps(NamedTuple):
+    """A step of n walkers, with gradients; in a window of steps, each with an axis for the steps in front.
 
     Attributes
     ----------
+    before : shape (n, features)
+        Observations before the step.
     observations : shape (n, features)
         After the step: where it ended an episode, that episode's last ones.
-    rewards, durations
-    terminated, truncated : bool
-    returns, lengths : of the episodes so far, without gradients; whole where this step ended one
+    rewards, durations : shape (n,)
+    terminated, truncated : bool, shape (n,)
+    returns, lengths : shape (n,)
+        Of the episodes so far, without gradients; of the whole episode where this step ended one.
     """
 
+    before: Tensor
     observations: Tensor
     rewards: Tensor
     durations: Tensor
@@ -44,14 +47,7 @@ class Walked(NamedTuple):
 
 
 class DifferentiableWalkers:
-    """``n`` walkers of an environment, all of whose numbers are its own.
-
-    Parameters
-    ----------
-    task : str
-    options : EnvOptions
-    n : int >= 1
-    threads : int >= 1
+    """``n`` walkers of an environment, whose observations and rewards are the environment's own.
 
     Attributes
     ----------
@@ -90,21 +86,17 @@ class DifferentiableWalkers:
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """Copies of all that the walkers' next steps depend on; only after ``reset``, and right for a moment at which gradients are cut."""
-        return self._saved.snapshot() | {
-            "episode_returns": self._returns.copy(),
-            "episode_lengths": self._lengths.copy(),
-        }
+        episodes = {"episode_returns": self._returns, "episode_lengths": self._lengths}
+        return self._saved.snapshot() | {name: each.copy() for name, each in episodes.items()}
 
     def restore(self, snapshot: dict[str, NDArray[Any]]) -> None:
         """Bring the walkers to a snapshot's state, or raise ``ValueError`` if it is of other walkers."""
         self._saved.restore(snapshot)
-        self._returns[:], self._lengths[:] = (
-            snapshot["episode_returns"],
-            snapshot["episode_lengths"],
-        )
+        self._returns[:] = snapshot["episode_returns"]
+        self._lengths[:] = snapshot["episode_lengths"]
         self.cut()
 
-    def step(self, actions: Tensor) -> Walked:
+    def step(self, actions: Tensor) -> Steps:
         """Walk one step each by actions (n, 2); walkers whose episode ended begin another, to which no gradient leads.
 
         Raises
@@ -122,20 +114,14 @@ class DifferentiableWalkers:
         )
         self._returns += rewards
         self._lengths += 1
-        size = self._followed.shape[1]
-        self._followed = outputs[:, :size]
-        self.observations = outputs[:, size:-2]
-        walked = Walked(
-            self.observations,
-            outputs[:, -2],
-            outputs[:, -1],
-            torch.from_numpy(terminated),
-            torch.from_numpy(truncated),
-            torch.from_numpy(self._returns.copy()),
-            torch.from_numpy(self._lengths.copy()),
+        size, before = self._followed.shape[1], self.observations
+        self._followed, self.observations = outputs[:, :size], outputs[:, size:-2]
+        done = (terminated, truncated, self._returns.copy(), self._lengths.copy())
+        step = Steps(
+            before, self.observations, outputs[:, -2], outputs[:, -1], *map(torch.from_numpy, done)
         )
         self._restart(terminated | truncated)
-        return walked
+        return step
 
     def _commanded(self, actions: Tensor) -> Tensor:
         """Inter-leg angle, offset and effort, shape (n, 3), as an action commands them."""
@@ -164,12 +150,10 @@ class DifferentiableWalkers:
             return
         self._returns[ended], self._lengths[ended] = 0.0, 0
         fresh, _ = self.env.reset(options={"reset_mask": ended})
-        mask = torch.from_numpy(ended)[:, None]
+        mask, observed = torch.from_numpy(ended)[:, None], torch.from_numpy(fresh.astype(float))
         values = torch.from_numpy(self._linearised.values())
         self._followed = torch.where(mask, values, self._followed)
-        self.observations = torch.where(
-            mask, torch.from_numpy(fresh.astype(float)), self.observations
-        )
+        self.observations = torch.where(mask, observed, self.observations)
 
 
 class _Known(Function):
@@ -188,15 +172,7 @@ class _Known(Function):
 
 
 def with_known_jacobians(inputs: Tensor, values: Tensor, jacobians: Tensor) -> Tensor:
-    """``values``, which a compiled computation made of ``inputs``, as a differentiable function of them.
-
-    Parameters
-    ----------
-    inputs : shape (n, j)
-    values : shape (n, k)
-    jacobians : shape (n, k, j)
-        The derivatives of ``values`` by ``inputs``.
-    """
+    """``values`` (n, k), which compiled code computed from ``inputs`` (n, j), as a differentiable function of them with Jacobians (n, k, j)."""
     return _Known.apply(inputs, values, jacobians)  # pyright: ignore[reportReturnType]
 
 
@@ -225,41 +201,8 @@ def bounded(value: Tensor, middle: Tensor, reach: float) -> Tensor:
     return _Bounded.apply(value, middle, reach)  # pyright: ignore[reportReturnType]
 
 
-class Window(NamedTuple):
-    """A window of steps of many walkers, with gradients.
-
-    Attributes
-    ----------
-    observations : shape (window, n, features)
-        Before each step.
-    next_observations : shape (window, n, features)
-        After it: where it ended an episode, that episode's last ones.
-    rewards, durations : shape (window, n)
-    terminated, truncated : bool, shape (window, n)
-    """
-
-    observations: Tensor
-    next_observations: Tensor
-    rewards: Tensor
-    durations: Tensor
-    terminated: Tensor
-    truncated: Tensor
-
-    @classmethod
-    def of(cls, observations: list[Tensor], steps: list[Walked]) -> Window:
-        """Steps one after the other, and what was observed before each."""
-        return cls(
-            torch.stack(observations),
-            torch.stack([step.observations for step in steps]),
-            torch.stack([step.rewards for step in steps]),
-            torch.stack([step.durations for step in steps]),
-            torch.stack([step.terminated for step in steps]),
-            torch.stack([step.truncated for step in steps]),
-        )
-
-
 def time_discounted_returns(
-    window: Window, next_values: Tensor, time_constant: float, trace: float
+    window: Steps, next_values: Tensor, time_constant: float, trace: float
 ) -> Tensor:
     """The lambda-return from each step on, shape (window, n).
 
@@ -268,10 +211,8 @@ def time_discounted_returns(
 
     Parameters
     ----------
-    window : Window
     next_values : shape (window, n)
         The critic's, after each step.
-    time_constant : float
     trace : lambda, from 0 (one step, then the critic) to 1 (the whole window, then the critic)
     """
     ratio = window.durations / time_constant

@@ -1,8 +1,8 @@
-"""Experience discounted in time: a walking step's length is the policy's choice, and must not be paid for.
+"""Experience discounted in time: a walking step's duration is the policy's choice, and must not change what a rate of reward is worth.
 
-With one discount for every step, long or short, a rate of reward R earns R times duration / (1 - discount): a policy gains by taking
-longer steps at the same rate. With a discount of exp(-duration / time constant) for each step it earns R times the time constant, whatever the
-steps, since a step's reward, spread evenly over its duration, is discounted within the step too.
+With one discount for every step, long or short, a rate of reward R is worth R times duration / (1 - discount): a policy gains by taking
+longer steps at the same rate. With a discount of exp(-duration / time constant) for each step it is worth R times the time constant, whatever
+the steps, since a step's reward, spread evenly over its duration, is discounted within the step too.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from lean_yaw_env.envs.hindsight import HindsightReplay
 
-from .recorder import Arrays
+from .recorder import Arrays, State, flattened
 
 
 def mean_discount(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -26,17 +26,10 @@ def mean_discount(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(ratio > 0.0, -np.expm1(-ratio) / np.where(ratio > 0.0, ratio, 1.0), 1.0)
 
 
-def named_arrays(name: str, value: Any) -> Arrays:
-    """An array, or each array of a dictionary, under a name of its own; views."""
-    if isinstance(value, dict):
-        return {f"{name}.{key}": each for key, each in value.items()}
-    return {name: np.asarray(value)}
-
-
 class TimeDiscountedBuffer(RolloutBuffer):
     """Stable-Baselines3's rollout buffer with a discount of exp(-duration / time constant) for each step.
 
-    ``durations`` (steps, walkers) is to be filled while experience is collected; 0 where an episode ended.
+    ``durations`` (steps, walkers) must be filled while experience is collected; 0 where an episode ended.
     """
 
     time_constant: float
@@ -70,15 +63,9 @@ class TimeDiscountedBuffer(RolloutBuffer):
 class TimeDiscountedReplay(ReplayBuffer):
     """Stable-Baselines3's replay buffer with a discount of exp(-duration / time constant) for each step.
 
-    What an algorithm multiplies the next value by is (1 - done) times its own discount, so that here ``dones``
-    are one less the step's discount, and the algorithm's own must be 1.
-
-    Parameters
-    ----------
-    time_constant : simulated time
-    typical_duration : stands in for that of an episode's last step, which no environment tells once it has begun the next
-
-    ``durations`` (steps, walkers) is to be filled before each ``add``.
+    An algorithm multiplies the next value by (1 - done) times its own discount. Here ``dones`` are therefore one less the step's discount,
+    and the algorithm's own discount must be 1. ``durations`` (steps, walkers) must be filled before each ``add``; ``typical_duration`` stands
+    in for the duration of an episode's last step, which the environment does not report once it has begun the next episode.
     """
 
     columns: ClassVar[tuple[str, ...]] = (
@@ -93,38 +80,31 @@ class TimeDiscountedReplay(ReplayBuffer):
         self.typical_duration = typical_duration
         self.durations: NDArray[np.float64] = np.zeros((self.buffer_size, self.n_envs))
 
-    def add(
-        self,
-        obs: Any,
-        next_obs: Any,
-        action: NDArray[Any],
-        reward: NDArray[Any],
-        done: NDArray[Any],
-        infos: list[dict[str, Any]],
-    ) -> None:
-        """Take a step of all walkers."""
-        self.durations[self.pos][np.asarray(done, dtype=np.bool_)] = self.typical_duration
-        super().add(obs, next_obs, action, reward, done, infos)  # pyright: ignore[reportAttributeAccessIssue]
+    def add(self, *step: Any) -> None:
+        """Take a step of all walkers: observations, next observations, actions, rewards, whether episodes ended, and infos."""
+        self.durations[self.pos][np.asarray(step[4], dtype=np.bool_)] = self.typical_duration
+        super().add(*step)  # pyright: ignore[reportAttributeAccessIssue]
 
     def captured(self) -> Arrays:
-        """The experience there is, and where the next goes."""
+        """The experience there is, and where the next goes; views."""
         filled = self.buffer_size if self.full else self.pos
         arrays = {name: column[:filled] for name, column in self._columns().items()}
         return arrays | {"position": np.array([self.pos, filled])}
 
-    def restore(self, arrays: Arrays) -> None:
-        """Bring the buffer to what ``captured`` gave, or raise ``KeyError`` or ``ValueError`` if it is another buffer's."""
+    def restore(self, state: State) -> None:
+        """Bring the buffer to what ``captured`` returned, or raise ``KeyError`` or ``ValueError`` if it is another buffer's."""
+        arrays = flattened(state)
         self.pos, filled = (int(value) for value in arrays["position"])
+        if not 0 <= self.pos < self.buffer_size or filled not in (self.pos, self.buffer_size):
+            raise ValueError(
+                f"position must be in the buffer of {self.buffer_size}, got {self.pos}"
+            )
         self.full = filled == self.buffer_size
         for name, column in self._columns().items():
             column[:filled] = arrays[name]
 
     def _columns(self) -> Arrays:
-        """All of the experience by name, one column for each key of a dictionary."""
-        columns: Arrays = {}
-        for name in self.columns:
-            columns |= named_arrays(name, getattr(self, name))
-        return columns
+        return flattened({name: getattr(self, name) for name in self.columns})
 
     def _get_samples(
         self, batch_inds: NDArray[np.int64], env: VecNormalize | None = None
@@ -151,13 +131,13 @@ class TimeDiscountedHindsight(TimeDiscountedReplay, HindsightReplay):
     columns: ClassVar[tuple[str, ...]] = (*TimeDiscountedReplay.columns, "ep_start", "ep_length")
 
     def captured(self) -> Arrays:
-        """The experience there is, where the next goes, and where the episodes under way began."""
-        return super().captured() | {"under_way": self._current_ep_start.copy()}
+        """With the starts of the episodes under way."""
+        return super().captured() | {"under_way": self._current_ep_start}
 
-    def restore(self, arrays: Arrays) -> None:
-        """Bring the buffer to what ``captured`` gave; see ``TimeDiscountedReplay``."""
-        super().restore(arrays)
-        self._current_ep_start[:] = arrays["under_way"]
+    def restore(self, state: State) -> None:
+        """With the starts of the episodes under way."""
+        super().restore(state)
+        self._current_ep_start[:] = state["under_way"]
 
     def _get_real_samples(
         self, batch_indices: Any, env_indices: Any, env: VecNormalize | None = None

@@ -12,12 +12,12 @@ from typing import Any
 from stable_baselines3.common.vec_env import VecNormalize
 
 from lean_yaw_env.envs.hindsight import GoalFromWalker
-from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.sb3 import WalkerVecEnv
 from lean_yaw_env.registration import GOAL_ENV_ID
 from lean_yaw_env.validation import require_choice
 
 from .experience import TimeDiscountedHindsight
+from .learner import LearnerSettings
 from .sac import SACLearner, SACSettings
 
 
@@ -53,22 +53,21 @@ class HERLearner(SACLearner):
     network = "MultiInputPolicy"
     replay = TimeDiscountedHindsight
 
-    def environment(
-        self, env_id: str, settings: Any, options: EnvOptions, threads: int
-    ) -> tuple[VecNormalize, WalkerVecEnv]:
-        """Walkers with dictionaries for observations; nothing is normalised."""
-        require_choice("env_id", env_id, (GOAL_ENV_ID,))
-        arguments = vars(settings.walked_under(options))
-        walkers = WalkerVecEnv(settings.walkers, env_id, threads=threads, **arguments)
-        return VecNormalize(walkers, norm_obs=False, norm_reward=False), walkers
+    def environment(self, env_id: str) -> str:
+        """The one with dictionaries for observations."""
+        return require_choice("env_id", env_id, (GOAL_ENV_ID,))
 
-    def network_arguments(self, settings: Any, options: EnvOptions) -> dict[str, Any]:
+    def normalised(self, walkers: WalkerVecEnv, settings: LearnerSettings) -> VecNormalize:
+        """The walkers as they are: nothing is normalised."""
+        return VecNormalize(walkers, norm_obs=False, norm_reward=False)
+
+    def network_arguments(self, settings: Any) -> dict[str, Any]:
         """With the view from the walker."""
-        return super().network_arguments(settings, options) | {
+        return super().network_arguments(settings) | {
             "features_extractor_class": GoalFromWalker,
-            "features_extractor_kwargs": {"mirror": options.mirror},
+            "features_extractor_kwargs": {"mirror": self.options.mirror},
         }
 
     def replay_arguments(self, settings: Any) -> dict[str, Any]:
-        """With the share of relabelled goals, which later places of the same walk are."""
+        """With the share of relabelled goals: later places of the same episode."""
         return super().replay_arguments(settings) | {"n_sampled_goal": settings.relabelled}

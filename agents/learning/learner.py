@@ -1,45 +1,43 @@
-"""What every learning algorithm has in common: the settings that all have, and what a learner can do."""
+"""What every learning algorithm has in common: the settings that all of them have, and what a learner can do."""
 
 from __future__ import annotations
 
-import contextlib
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import nn
 from torch.optim import Optimizer
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.validation import require_count, require_number
 
 from ..seeds import MOST_WALKERS
-from .recorder import Arrays, Recorder
+from .recorder import Recorder, State
 
 GAIT_STEP = 0.73
 """Duration of a step in Table 1's gait, in units of sqrt(leg length / gravity)."""
-_MANY = 10**12
 
 
 @dataclass(frozen=True)
 class LearnerSettings:
-    """The settings that every algorithm has; each names its defaults.
+    """The settings that every algorithm has; each algorithm has defaults of its own.
 
     Attributes
     ----------
     steps : environment steps of the training, over all walkers
     walkers : walkers stepped together
     learning_rate : of Adam, at the start
-    final_learning_rate : share of it that is left at the end; it falls linearly
-    time_constant : simulated time in which a reward's worth falls to 1/e (see ``experience``); a step takes 0.73 at the gait
+    final_learning_rate : share of it at the end; it falls linearly
+    time_constant : simulated time over which rewards are discounted to 1/e (see ``experience``); a step takes 0.73 at the gait
     hidden : units of each hidden layer, of policy and critics alike
-    push_level : random pushes walked under in training only, in place of the environment's (``EnvOptions.push_level``)
-        They show the policy states that it would not come to by itself, and leave a margin: without pushes, some trained policies keep so
-        close to falling that a few episodes in a thousand end so. None leaves the environment as it is.
+    push_level : random pushes in training only, in place of the environment's (``EnvOptions.push_level``); None for the environment's own
+        Pushes show the policy states that it would not reach by itself, and leave a margin: without pushes, some trained policies walk so
+        close to falling that a few episodes in a thousand end in a fall.
     """
 
     steps: int
@@ -52,8 +50,17 @@ class LearnerSettings:
 
     @property
     def typical_discount(self) -> float:
-        """The discount over a step of the gait's duration, where only one number will do."""
+        """The discount over a step of the gait's duration, where only one number is possible."""
         return math.exp(-GAIT_STEP / self.time_constant)
+
+    @property
+    def update_steps(self) -> int:
+        """Steps of all walkers between two updates at most: a training may end so many after ``steps``."""
+        return self.steps
+
+    def learning_rate_share(self, left: float) -> float:
+        """Share of the first learning rate when the share ``left`` of the training is left."""
+        return self.final_learning_rate + (1.0 - self.final_learning_rate) * left
 
     def __post_init__(self) -> None:
         require_count("walkers", self.walkers, 1, MOST_WALKERS)
@@ -62,15 +69,15 @@ class LearnerSettings:
         self.require_shares("final_learning_rate")
         if self.push_level is not None:
             require_number("push_level", self.push_level, 0.0, 10.0)
-        if not self.hidden or any(units < 1 for units in self.hidden):
-            raise ValueError(
-                f"hidden must name one layer or more of 1 unit or more, got {self.hidden}"
-            )
+        if not isinstance(self.hidden, tuple) or not self.hidden:
+            raise ValueError(f"hidden must name one layer or more, got {self.hidden!r}")
+        for units in self.hidden:
+            require_count("units of each layer in hidden", units, 1, 2**16)
 
     def require_counts(self, *names: str, low: int = 1) -> None:
         """``ValueError`` unless these settings are whole numbers from ``low`` on."""
         for name in names:
-            require_count(name, getattr(self, name), low, _MANY)
+            require_count(name, getattr(self, name), low, 10**12)
 
     def require_positive(self, *names: str) -> None:
         """``ValueError`` unless these settings are above 0."""
@@ -82,13 +89,15 @@ class LearnerSettings:
         for name in names:
             require_number(name, getattr(self, name), 0.0, 1.0)
 
-    def walked_under(self, options: EnvOptions) -> EnvOptions:
+    def training_options(self, options: EnvOptions) -> EnvOptions:
         """The environment's options in the training."""
         return options if self.push_level is None else replace(options, push_level=self.push_level)
 
 
 class Learner(Protocol):
     """A training in progress: the walkers, networks and optimisers of one algorithm.
+
+    It is made of an environment's id, settings, seed, the environment's options, threads, and a folder for TensorBoard's logs or None.
 
     Attributes
     ----------
@@ -102,25 +111,21 @@ class Learner(Protocol):
     @property
     def steps(self) -> int: ...
 
-    def capture(self) -> Arrays:
-        """All that decides how the training goes on, between two updates."""
+    def capture(self) -> State:
+        """Everything that decides how the training continues, between two updates."""
         ...
 
-    def restore(self, arrays: Arrays) -> None:
-        """Bring a learner that was made with the same settings to a captured state, or raise ``CheckpointError``."""
+    def restore(self, state: Any) -> None:
+        """Bring a learner that was made with the same settings to a captured state; any ``ValueError`` or ``KeyError`` means that it does not fit."""
         ...
 
     def learn(self, recorder: Recorder) -> None:
-        """Train to the end; tell the recorder of every episode, and when an update is done."""
+        """Train to the end; pass every episode to the recorder, and call its ``between_updates`` after each update."""
         ...
 
     def weights(self) -> dict[str, NDArray[np.float32]]:
-        """The policy's numbers, by the names that ``Policy`` takes."""
+        """The policy's weights, by the names that ``Policy`` takes."""
         ...
-
-
-MakeLearner = Callable[[str, Any, int, EnvOptions, int, "Path | None"], Learner]
-"""Makes a learner of an environment's id, settings, seed, the environment's options, threads and a folder for TensorBoard's logs or None."""
 
 
 def settings_to_plain(settings: LearnerSettings) -> dict[str, Any]:
@@ -133,31 +138,27 @@ def float_array(tensor: torch.Tensor) -> NDArray[np.float32]:
     return tensor.detach().cpu().numpy().astype(np.float32)
 
 
-def optimizer_arrays(optimizer: Optimizer) -> Arrays:
-    """An optimiser's state, as ``<parameter>.<slot>``."""
-    return {
-        f"{index}.{slot}": value.detach().cpu().numpy().copy()
-        for index, slots in optimizer.state_dict()["state"].items()
-        for slot, value in slots.items()
-    }
+def captured(networks: Mapping[str, nn.Module], optimizers: Mapping[str, Optimizer]) -> State:
+    """The states of networks and optimisers, which ``restore`` takes."""
+    states = {name: network.state_dict() for name, network in networks.items()}
+    return states | {name: each.state_dict()["state"] for name, each in optimizers.items()}
 
 
-def restore_optimizer(optimizer: Optimizer, arrays: Arrays) -> None:
-    """Bring an optimiser to the state that ``optimizer_arrays`` gave."""
-    state: dict[int, dict[str, torch.Tensor]] = {}
-    for name, value in arrays.items():
-        index, slot = name.split(".")
-        state.setdefault(int(index), {})[slot] = torch.from_numpy(value.copy())
-    groups = optimizer.state_dict()["param_groups"]
-    optimizer.load_state_dict({"state": state, "param_groups": groups})
-
-
-@contextlib.contextmanager
-def torch_threads(threads: int) -> Iterator[None]:
-    """Torch's own default is a thread for every core, which small networks only lose by."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(threads)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
+def restore(
+    networks: Mapping[str, nn.Module], optimizers: Mapping[str, Optimizer], state: State
+) -> None:
+    """Bring networks and optimisers to the states that ``captured`` returned."""
+    for name, network in networks.items():
+        network.load_state_dict({k: torch.from_numpy(v) for k, v in state[name].items()})
+    for name, optimizer in optimizers.items():
+        parameters = [each for group in optimizer.param_groups for each in group["params"]]
+        for index, slots_of_one in state.get(name, {}).items():
+            for slot, value in slots_of_one.items():
+                if value.shape not in ((), parameters[int(index)].shape):
+                    raise ValueError(f"{name}/{index}/{slot} has the shape {value.shape}")
+        slots = {
+            int(index): {slot: torch.from_numpy(value) for slot, value in each.items()}
+            for index, each in state.get(name, {}).items()  # nothing before the first update
+        }
+        groups = optimizer.state_dict()["param_groups"]
+        optimizer.load_state_dict({"state": slots, "param_groups": groups})

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
+from torch.optim import Optimizer
 
-from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.validation import require_number
 
-from ..seeds import training_seed
 from .experience import TimeDiscountedBuffer
 from .learner import LearnerSettings, float_array
-from .stable_baselines import Falling, StableBaselinesLearner, training_environment
+from .stable_baselines import StableBaselinesLearner, TimedBuffer
 
 
 @dataclass(frozen=True)
@@ -50,6 +49,10 @@ class PPOSettings(LearnerSettings):
     largest_gradient: float = 0.5
     initial_log_std: float = -0.5
 
+    @property
+    def update_steps(self) -> int:
+        return self.walkers * self.steps_per_update
+
     def __post_init__(self) -> None:
         super().__post_init__()
         self.require_counts("steps_per_update", "batch_size", "epochs")
@@ -58,10 +61,9 @@ class PPOSettings(LearnerSettings):
         for name in ("entropy", "value_weight"):
             require_number(name, getattr(self, name), 0.0, math.inf, "[)")
         require_number("initial_log_std", self.initial_log_std, -20.0, 2.0)
-        samples = self.walkers * self.steps_per_update
-        if samples % self.batch_size:
+        if self.update_steps % self.batch_size:
             raise ValueError(
-                f"batch_size must divide the {samples} samples of an update, got {self.batch_size}"
+                f"batch_size must divide the {self.update_steps} samples of an update, got {self.batch_size}"
             )
 
 
@@ -70,25 +72,14 @@ class PPOLearner(StableBaselinesLearner):
 
     activation = "tanh"
     output = "clip"
+    model: PPO
 
-    def __init__(
-        self,
-        env_id: str,
-        settings: PPOSettings,
-        seed: int,
-        options: EnvOptions,
-        threads: int,
-        tensorboard: Path | None,
-    ) -> None:
-        first = training_seed(seed)
-        env, walkers = training_environment(env_id, settings, options, threads)
-        model = PPO(
+    def make_model(self, settings: PPOSettings, **common: Any) -> PPO:
+        return PPO(
             "MlpPolicy",
-            env,
             n_steps=settings.steps_per_update,
             batch_size=settings.batch_size,
             n_epochs=settings.epochs,
-            learning_rate=Falling.of(settings),
             gamma=settings.typical_discount,
             gae_lambda=settings.gae_lambda,
             clip_range=settings.clip_range,
@@ -102,14 +93,16 @@ class PPOLearner(StableBaselinesLearner):
             },
             rollout_buffer_class=TimeDiscountedBuffer,
             rollout_buffer_kwargs={"time_constant": settings.time_constant},
-            tensorboard_log=None if tensorboard is None else str(tensorboard),
-            seed=seed,
-            device="cpu",
+            **common,
         )
-        walkers.seed(first)  # in place of the policy's seed, which SB3 gives them too
-        buffer = cast(TimeDiscountedBuffer, model.rollout_buffer)
-        super().__init__(model, buffer, {"adam": model.policy.optimizer}, settings.steps)
-        self._depth = len(settings.hidden)
+
+    @property
+    def buffer(self) -> TimedBuffer:
+        return cast(TimeDiscountedBuffer, self.model.rollout_buffer)
+
+    @property
+    def optimizers(self) -> Mapping[str, Optimizer]:
+        return {"adam": self.model.policy.optimizer}
 
     def layers(self) -> dict[str, str]:
         """The policy's hidden layers, and the one that gives the mean action."""
@@ -118,6 +111,5 @@ class PPOLearner(StableBaselinesLearner):
 
     def weights(self) -> dict[str, NDArray[np.float32]]:
         """With the deviation of actions, which PPO has the same for all observations."""
-        return super().weights() | {
-            "log_std": float_array(self.model.policy.state_dict()["log_std"])
-        }
+        log_std = float_array(self.model.policy.state_dict()["log_std"])
+        return super().weights() | {"log_std": log_std}

@@ -1,29 +1,37 @@
-"""A training from settings to a folder of results: train, judge beside the baselines, draw."""
+"""A training from settings to a folder of results: train, evaluate beside the baselines, draw."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from tqdm import tqdm
 
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.files import read_json, write_json
-from lean_yaw_env.validation import require_count
+from lean_yaw_env.files import locked, read_json, write_json
+from lean_yaw_env.registration import ALL_ENV_IDS
+from lean_yaw_env.validation import require_choice, require_count, require_flag, require_number
 
-from ..agent import Agent
 from ..evaluation.episodes import Row
-from ..evaluation.footprint_pictures import save_agents_footprints
+from ..evaluation.pictures import save_agents_footprints
 from ..evaluation.row_tables import rows_to_plain
 from ..evaluation.scoring import evaluate
 from ..policies.policy import Policy, package_versions
-from ..policies.policy_files import CARD_FILE, options_from_plain, options_to_plain, save, task_of
+from ..policies.policy_files import (
+    CARD_FILE,
+    load,
+    options_from_plain,
+    options_to_plain,
+    save,
+    task_of,
+)
 from ..registry import AgentRequest, env_id_of, make_all
-from ..seeds import MOST_EPISODES, evaluation_seed, training_seed
-from .algorithms import settings_for, settings_from_plain, train
+from ..seeds import MOST_EPISODES, first_seed, training_seed
+from ..settings import with_values
+from .algorithms import ALGORITHMS, settings_for, train
 from .curves import save_learning_curve
 from .learner import LearnerSettings, settings_to_plain
 from .recorder import Report, TrainingLog
@@ -35,18 +43,16 @@ CURVE_FILE = "learning_curve.png"
 FOOTPRINTS_FILE = "footprints.png"
 EVALUATION_FILE = "evaluation.json"
 STATISTICS_FILE = "observation_statistics.json"
-EVALUATION = 0
-"""Seed of the episodes that runs are judged on: the same for all of them, so that what differs is the training."""
 
 
 @dataclass(frozen=True)
 class Training:
-    """What to train, and everything that decides how; kept in the run's folder, so that it can be gone on with.
+    """What to train, and everything that decides how; kept in the run's folder, so that it can be resumed.
 
     Attributes
     ----------
     env_id : an environment's id
-    seed : of the policy's start, the walkers and all that is drawn
+    seed : of the policy's initial weights, the walkers and everything that is drawn
     settings : the algorithm's
     options : the environment's
     episodes : of the evaluation
@@ -66,11 +72,29 @@ class Training:
     tensorboard: bool = False
     algorithm: str = "ppo"
 
+    def __post_init__(self) -> None:
+        training_seed(self.seed)
+        require_choice("env_id", self.env_id, ALL_ENV_IDS)
+        entry = ALGORITHMS[require_choice("algorithm", self.algorithm, ALGORITHMS)]
+        require_choice(f"task of {self.algorithm}", self.task, entry.tasks)
+        if type(self.settings) is not entry.settings:
+            raise ValueError(f"settings must be {entry.settings.__name__}, got {self.settings!r}")
+        require_count("episodes", self.episodes, 1, MOST_EPISODES)
+        require_count("threads", self.threads, 1, 1024)
+        require_number("checkpoint_seconds", self.checkpoint_seconds, 0.0, math.inf)
+        require_flag("tensorboard", self.tensorboard)
+
     @classmethod
     def of_task(
-        cls, task: str, *, seed: int = 0, steps: int | None = None, **others: Any
+        cls,
+        task: str,
+        *,
+        seed: int = 0,
+        steps: int | None = None,
+        options: EnvOptions | None = None,
+        **others: Any,
     ) -> Training:
-        """The training that is tuned for a task, with another number of steps if one is given.
+        """The training with the package's settings for a task, with another number of steps and other options if they are given.
 
         Raises
         ------
@@ -78,30 +102,25 @@ class Training:
             If a name or number is bad.
         """
         env_id = env_id_of(task)
-        training_seed(seed)
-        require_count("episodes", others.get("episodes", cls.episodes), 1, MOST_EPISODES)
-        require_count("threads", others.get("threads", cls.threads), 1, 1024)
         settings = settings_for(others.get("algorithm", cls.algorithm), task)
         if steps is not None:
             settings = replace(settings, steps=steps)
-        return cls(env_id, seed, settings, EnvOptions(), **others)
+        return cls(env_id, seed, settings, options or EnvOptions(), **others)
 
     @property
     def task(self) -> str:
         return task_of(self.env_id)
 
 
-@dataclass(frozen=True)
-class FinishedRun:
-    """What a training left behind."""
+class FinishedRun(NamedTuple):
+    """The results of a training: the policy and the rows of its evaluation."""
 
-    folder: Path
     policy: Policy
     rows: list[Row]
 
 
 def new_folder(out: Path, training: Training, ending: str) -> Path:
-    """The path of a folder that is not there yet, named by task, algorithm, time and ``ending``."""
+    """The path of a folder that does not exist yet, named by task, algorithm, time and ``ending``."""
     stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
     name = f"{training.task}-{training.algorithm}-{stamp}-{ending}"
     folder, number = out / name, 1
@@ -112,66 +131,76 @@ def new_folder(out: Path, training: Training, ending: str) -> Path:
 
 
 def new_run(training: Training, out: Path) -> Path:
-    """Make the folder of a new run under ``out``, and note in it what is trained."""
+    """Make the folder of a new run under ``out``, and write into it what is trained."""
     folder = new_folder(out, training, f"seed{training.seed}")
     make_run(training, folder)
     return folder
 
 
 def make_run(training: Training, folder: Path) -> None:
-    """Make a run's folder, which must not be there, and note in it what is trained."""
+    """Make a run's folder, which must not exist, and write into it what is trained."""
     folder.mkdir(parents=True)
     record = asdict(training) | {
         "settings": settings_to_plain(training.settings),
         "options": options_to_plain(training.options),
         "versions": package_versions(),
         "walkers_seed": training_seed(training.seed),
-        "evaluation_seed": evaluation_seed(EVALUATION),
+        "evaluation_seed": first_seed("validation"),
     }
     write_json(folder / RUN_FILE, record)
 
 
 def is_finished(folder: Path) -> bool:
-    """Whether a run has been trained and judged."""
+    """Whether a run has been trained and evaluated."""
     return (folder / EVALUATION_FILE).exists() and (folder / CARD_FILE).exists()
 
 
 def read_run(folder: Path) -> Training:
-    """What a run's folder says is trained in it, or ``ValueError``."""
+    """The training that a run's folder holds, or ``ValueError``."""
     record = read_json(folder / RUN_FILE)
-    names = set(Training.__dataclass_fields__)
     try:
-        values = {key: value for key, value in record.items() if key in names}
-        values["settings"] = settings_from_plain(
-            values.get("algorithm", Training.algorithm), values["settings"]
-        )
+        values = {key: record[key] for key in Training.__dataclass_fields__}
+        settings = ALGORITHMS[values["algorithm"]].settings()
+        if set(values["settings"]) != set(vars(settings)):
+            raise ValueError(f"its settings must hold {', '.join(vars(settings))}")
+        values["settings"] = with_values(settings, values["settings"])
         values["options"] = options_from_plain(values["options"])
-        return Training(**values)
-    except (AttributeError, KeyError, TypeError) as error:
+        training = Training(**values)
+        seeds = (training_seed(training.seed), first_seed("validation"))
+        if (record["walkers_seed"], record["evaluation_seed"]) != seeds:
+            raise ValueError(f"its seeds of walkers and evaluation must be {seeds}")
+        return training
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{str(folder / RUN_FILE)!r} is not a run's: {error}") from error
 
 
 def read_log(folder: Path) -> TrainingLog:
     """The episodes of a finished run, or ``ValueError``."""
-    seconds = float(read_json(folder / CARD_FILE)["training"]["seconds"])
-    return TrainingLog.read(folder / LOG_FILE, seconds)
+    return TrainingLog.read(folder / LOG_FILE, float(load(folder).card.training["seconds"]))
 
 
 def run(folder: Path, *, progress: bool = True, report: Report | None = None) -> FinishedRun:
-    """Train what a run's folder says, or go on with it, and leave there all that comes of it.
+    """Train what a run's folder holds, from its checkpoint on if there is one, and write all results into the folder.
 
     Parameters
     ----------
     folder : that ``new_run`` made
     progress : show bars
-    report : told of the steps done and the latest returns, between updates
+    report : called between updates
 
     Raises
     ------
     ValueError
         If the folder's files are damaged.
+    BusyError
+        If another process is at work in the folder.
     """
-    training = read_run(folder)
+    with locked(folder):
+        return _run(folder, read_run(folder), progress, report)
+
+
+def _run(folder: Path, training: Training, progress: bool, report: Report | None) -> FinishedRun:
+    task, steps = training.task, training.settings.steps
     trained = train(
         training.algorithm,
         training.env_id,
@@ -185,58 +214,32 @@ def run(folder: Path, *, progress: bool = True, report: Report | None = None) ->
         report=report,
         tensorboard=folder / "tensorboard" if training.tensorboard else None,
     )
-    save(trained.policy, folder)
-    _write_statistics(folder, trained.policy)
-    trained.log.write(folder / LOG_FILE)
-    agents = _judged_agents(training, trained.policy)
-    rows = _judge(training, agents, progress)
-    _draw(folder, training, agents, trained.log, rows)
-    write_json(folder / EVALUATION_FILE, rows_to_plain(rows))  # last: it marks the run as finished
-    return FinishedRun(folder, trained.policy, rows)
-
-
-def _judged_agents(training: Training, policy: Policy) -> dict[str, Agent]:
-    """The trained policy beside the quick agents that need no training and know the task."""
+    policy, log = trained.policy, trained.log
+    save(policy, folder)
+    _write_statistics(folder, policy)
+    log.write(folder / LOG_FILE)
     request = AgentRequest(training.env_id, training.options, seed=training.seed)
-    return make_all(request, ("baseline", "feedback")) | {policy.card.algorithm: policy}
-
-
-def _judge(training: Training, agents: Mapping[str, Agent], progress: bool) -> list[Row]:
+    agents = make_all(request, ("baseline", "feedback")) | {training.algorithm: policy}
     total = training.episodes * len(agents)
     with tqdm(total=total, desc="evaluating", unit="episode", disable=not progress) as bar:
-        return evaluate(
-            training.task,
-            agents,
-            episodes=training.episodes,
-            seed=EVALUATION,
-            options=training.options,
-            progress=bar.update,
-        )
-
-
-def _draw(
-    folder: Path,
-    training: Training,
-    agents: Mapping[str, Agent],
-    log: TrainingLog,
-    rows: list[Row],
-) -> None:
-    steps = training.settings.steps
-    title = f"{training.algorithm.upper()} on {training.task}, seed {training.seed}: {steps:,} steps in {log.seconds:.0f} s"
+        rows = evaluate(
+            task, agents,
+            episodes=training.episodes, options=training.options, progress=bar.update,
+        )  # fmt: skip
+    title = f"{training.algorithm.upper()} on {task}, seed {training.seed}: {steps:,} steps in {log.seconds:.0f} s"
     save_learning_curve(log, rows, training.algorithm, title, steps, folder / CURVE_FILE)
     save_agents_footprints(
-        agents, training.task, folder / FOOTPRINTS_FILE,
-        seed=evaluation_seed(EVALUATION), options=training.options,
+        agents, task, folder / FOOTPRINTS_FILE, seed=first_seed("validation"), options=training.options
     )  # fmt: skip
+    write_json(folder / EVALUATION_FILE, rows_to_plain(rows))  # last: it marks the run as finished
+    return FinishedRun(policy, rows)
 
 
 def _write_statistics(folder: Path, policy: Policy) -> None:
-    """The statistics that the policy normalises observations by, for people; the policy's own file has them too."""
+    """The statistics that normalise observations, for people; the policy's own file has them too."""
     mean, variance = policy.weights["observation_mean"], policy.weights["observation_variance"]
-    write_json(
-        folder / STATISTICS_FILE,
-        {
-            name: {"mean": float(m), "variance": float(v)}
-            for name, m, v in zip(policy.card.layout.names, mean, variance, strict=True)
-        },
-    )
+    record = {
+        name: {"mean": float(m), "variance": float(v)}
+        for name, m, v in zip(policy.card.layout.names, mean, variance, strict=True)
+    }
+    write_json(folder / STATISTICS_FILE, record)

@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from stable_baselines3 import SAC
-from stable_baselines3.common.vec_env import VecNormalize
+from torch.optim import Optimizer
 
-from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
-from lean_yaw_env.envs.sb3 import WalkerVecEnv
+from lean_yaw_env.envs.options import ACTION_SIZE
 from lean_yaw_env.validation import require_count, require_number
 
-from ..seeds import training_seed
 from .experience import TimeDiscountedReplay
-from .learner import GAIT_STEP, LearnerSettings, float_array
-from .recorder import Arrays, restoring, under
-from .stable_baselines import (
-    Falling,
-    StableBaselinesLearner,
-    captured_observations,
-    restored_observations,
-    training_environment,
-)
-
-_REPLAY = "replay."
+from .learner import GAIT_STEP, LearnerSettings
+from .recorder import State
+from .stable_baselines import StableBaselinesLearner
 
 
 @dataclass(frozen=True)
@@ -58,6 +48,10 @@ class SACSettings(LearnerSettings):
     target_entropy: float = -4.0
     initial_entropy_weight: float = 0.1
 
+    @property
+    def update_steps(self) -> int:
+        return self.walkers
+
     def __post_init__(self) -> None:
         super().__post_init__()
         self.require_counts("gradient_steps", "batch_size")
@@ -83,30 +77,19 @@ class EvenlyStartedSAC(SAC):
 class SACLearner(StableBaselinesLearner):
     """SAC with a discount in time; see ``learner.Learner``.
 
-    Its checkpoint holds what is remembered of the walks too, some 90 bytes for each of ``buffer_size`` steps. Its actions are the hyperbolic
-    tangent of what the policy's last layer draws about.
+    Its checkpoint holds the replay buffer too, some 90 bytes for each of ``buffer_size`` steps. Its actions are the hyperbolic
+    tangent of what is drawn around the policy's last layer.
     """
 
     activation = "relu"
     output = "tanh"
     network = "MlpPolicy"
     replay: type[Any] = TimeDiscountedReplay
+    model: EvenlyStartedSAC
 
-    def __init__(
-        self,
-        env_id: str,
-        settings: SACSettings,
-        seed: int,
-        options: EnvOptions,
-        threads: int,
-        tensorboard: Path | None,
-    ) -> None:
-        first = training_seed(seed)
-        env, walkers = self.environment(env_id, settings, options, threads)
-        model = EvenlyStartedSAC(
+    def make_model(self, settings: SACSettings, **common: Any) -> EvenlyStartedSAC:
+        return EvenlyStartedSAC(
             self.network,
-            env,
-            learning_rate=Falling.of(settings),
             buffer_size=settings.buffer_size,
             learning_starts=settings.random_steps,
             batch_size=settings.batch_size,
@@ -116,57 +99,57 @@ class SACLearner(StableBaselinesLearner):
             gradient_steps=settings.gradient_steps,
             ent_coef=f"auto_{settings.initial_entropy_weight}",
             target_entropy=settings.target_entropy,
-            policy_kwargs=self.network_arguments(settings, options),
+            policy_kwargs=self.network_arguments(settings),
             replay_buffer_class=self.replay,
             replay_buffer_kwargs=self.replay_arguments(settings),
-            tensorboard_log=None if tensorboard is None else str(tensorboard),
-            seed=seed,
-            device="cpu",
+            **common,
         )
-        walkers.seed(first)  # in place of the policy's seed, which SB3 gives them too
-        entropy = model.ent_coef_optimizer
-        assert entropy is not None and model.log_ent_coef is not None  # its weight is learnt
-        optimizers = {
-            "adam_actor": model.actor.optimizer,
-            "adam_critic": model.critic.optimizer,
-            "adam_entropy": entropy,
-        }
-        self._replay = cast(TimeDiscountedReplay, model.replay_buffer)
-        self._log_entropy_weight = model.log_ent_coef
-        super().__init__(model, self._replay, optimizers, settings.steps)
-        self._depth = len(settings.hidden)
 
-    def environment(
-        self, env_id: str, settings: Any, options: EnvOptions, threads: int
-    ) -> tuple[VecNormalize, WalkerVecEnv]:
-        """The walkers that experience comes from."""
-        return training_environment(env_id, settings, options, threads)
-
-    def network_arguments(self, settings: Any, options: EnvOptions) -> dict[str, Any]:
-        """What the networks are made with."""
+    def network_arguments(self, settings: Any) -> dict[str, Any]:
+        """Arguments of the networks."""
         return {"net_arch": list(settings.hidden), "activation_fn": torch.nn.ReLU}
 
     def replay_arguments(self, settings: Any) -> dict[str, Any]:
-        """What the buffer is made with."""
+        """Arguments of the replay buffer."""
         return {"time_constant": settings.time_constant, "typical_duration": GAIT_STEP}
+
+    @property
+    def buffer(self) -> TimeDiscountedReplay:
+        return cast(TimeDiscountedReplay, self.model.replay_buffer)
+
+    @property
+    def optimizers(self) -> Mapping[str, Optimizer]:
+        model = self.model
+        assert model.ent_coef_optimizer is not None  # the entropy's weight is learnt
+        return {
+            "adam_actor": model.actor.optimizer,
+            "adam_critic": model.critic.optimizer,
+            "adam_entropy": model.ent_coef_optimizer,
+        }
 
     def layers(self) -> dict[str, str]:
         """The actor's hidden layers, the one that gives the mean action, and the one that gives the deviation."""
         hidden = {f"layers.{k}": f"actor.latent_pi.{2 * k}" for k in range(self._depth)}
         return hidden | {f"layers.{self._depth}": "actor.mu", "log_std": "actor.log_std"}
 
-    def capture(self) -> Arrays:
+    def capture(self) -> State:
         """With the replay buffer and the entropy's weight."""
-        arrays = super().capture()
-        arrays |= captured_observations("last.unnormalised", self.model._last_original_obs)
-        arrays["entropy.log_weight"] = float_array(self._log_entropy_weight)
-        return arrays | {_REPLAY + name: array for name, array in self._replay.captured().items()}
+        return {
+            **super().capture(),
+            "unnormalised": {"observations": self.model._last_original_obs},
+            "replay": self.buffer.captured(),
+            "log_entropy_weight": self._log_entropy_weight.detach(),
+        }
 
-    def restore(self, arrays: Arrays) -> None:
-        """Bring the model to a captured state; see ``Learner``."""
-        super().restore(arrays)
-        with restoring():
-            self._replay.restore(under(_REPLAY, arrays))
-            self.model._last_original_obs = restored_observations("last.unnormalised", arrays)
-            with torch.no_grad():
-                self._log_entropy_weight.copy_(torch.from_numpy(arrays["entropy.log_weight"]))
+    def restore(self, state: Any) -> None:
+        """Bring the model to a captured state."""
+        super().restore(state)
+        self.model._last_original_obs = state["unnormalised"]["observations"]
+        self.buffer.restore(state["replay"])
+        with torch.no_grad():
+            self._log_entropy_weight.copy_(torch.from_numpy(state["log_entropy_weight"]))
+
+    @property
+    def _log_entropy_weight(self) -> torch.Tensor:
+        assert self.model.log_ent_coef is not None  # it is learnt
+        return self.model.log_ent_coef

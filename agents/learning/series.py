@@ -1,9 +1,8 @@
-"""One training repeated with several seeds: a run for each, side by side if wanted, then their learning curves and what differs between them."""
+"""One training repeated with several seeds: a run for each, in parallel if wanted, then their learning curves and a table of their results."""
 
 from __future__ import annotations
 
-import csv
-import io
+import contextlib
 import multiprocessing
 import re
 import signal
@@ -11,7 +10,7 @@ import sys
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import wait
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any
@@ -21,9 +20,13 @@ from rich import box
 from rich.table import Table
 from tqdm import tqdm
 
-from lean_yaw_env.files import read_json, write_json, write_text
-from lean_yaw_env.validation import require_count
+from lean_yaw_env.errors import LeanYawError
+from lean_yaw_env.files import locked, read_json, write_json, write_text
+from lean_yaw_env.registration import ALL_ENV_IDS
+from lean_yaw_env.reporting import reporting, uninterrupted
+from lean_yaw_env.validation import require_choice, require_count
 
+from ..evaluation.episodes import RETURN
 from ..registry import env_id_of
 from ..seeds import TRAINING_SEEDS
 from .curves import save_seeds_curves
@@ -45,46 +48,35 @@ SEEDS_FILE = "seeds.csv"
 _MOST_COLUMNS = 5  # seeds shown one by one: more do not fit a terminal
 
 
-class RunError(RuntimeError):
-    """A run whose process did not end well; what it wrote stays and can be gone on with."""
-
-
-@dataclass(frozen=True)
-class SeedMeans:
-    """A metric's mean over episodes, of each seed's policy.
-
-    Attributes
-    ----------
-    metric : its name
-    seeds, means : as many; NaN where every episode left the metric undefined
-    """
-
-    metric: str
-    seeds: tuple[int, ...]
-    means: tuple[float, ...]
-
-    @property
-    def median(self) -> float:
-        return float(np.median(self.means))
+class RunError(LeanYawError):
+    """A run whose process failed; what it wrote stays and can be resumed."""
 
 
 @dataclass(frozen=True)
 class SeriesResult:
-    """What a series left behind: its folder, the seeds' means of each metric, and the other agents' means by metric and agent."""
+    """The results of a series.
 
-    folder: Path
-    by_seed: list[SeedMeans]
+    Attributes
+    ----------
+    seeds : of the trainings
+    means : by metric, its mean over episodes for each seed's policy, in the order of ``seeds``; NaN where every episode left it undefined
+    others : by metric and agent, the means of the other agents
+    """
+
+    seeds: tuple[int, ...]
+    means: dict[str, list[float]]
     others: dict[str, dict[str, float]]
+
+    def rows(self) -> list[tuple[Any, ...]]:
+        """For each metric its name, the median, lowest and highest mean over the seeds, and each seed's mean."""
+        return [
+            (name, float(np.median(each)), min(each), max(each), *each)
+            for name, each in self.means.items()
+        ]
 
 
 def parse_seeds(text: str) -> tuple[int, ...]:
-    """Seeds from ``0-4`` (from, to), ``0,3,7`` or both; a single number is how many, from 0 on.
-
-    Raises
-    ------
-    ValueError
-        If the text says nothing of the kind, or a seed twice.
-    """
+    """Seeds from ``0-4`` (from, to), ``0,3,7`` or both; a single number is how many, from 0 on. ``ValueError`` for other texts and repeated seeds."""
     parts = [re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}))?", part.strip()) for part in text.split(",")]
     if len(parts) == 1 and parts[0] and parts[0][2] is None:
         parts = [re.fullmatch(r"(\d+)-(\d+)", f"0-{int(parts[0][1]) - 1}")]
@@ -98,13 +90,7 @@ def parse_seeds(text: str) -> tuple[int, ...]:
 
 
 def new_series(task: str, seeds: Sequence[int], out: Path, choices: Mapping[str, Any]) -> Path:
-    """Make the folder of a series with one run for each seed, and note what is in it.
-
-    Parameters
-    ----------
-    task, seeds : what to train
-    out : where to make the folder
-    choices : other arguments of ``Training.of_task``
+    """Make a folder under ``out`` with one run for each seed; ``choices`` are other arguments of ``Training.of_task``.
 
     Raises
     ------
@@ -129,30 +115,28 @@ def is_series(folder: Path) -> bool:
 def resumed(
     task: str, out: Path, folder: Path | None = None, choices: Mapping[str, Any] | None = None
 ) -> Path:
-    """The folder of a run or a series to go on with: the one given, or the newest unfinished one of the task under ``out``.
+    """The folder of a run or a series to resume: the one given, or the newest unfinished one of the task under ``out``.
 
     Raises
     ------
     ValueError
-        If there is none, it is finished, or there are choices: what is resumed keeps its own.
+        If there is none, it is finished, or there are ``choices``: a resumed run keeps its own settings.
     """
     if choices:
         names = ", ".join(choices)
         raise ValueError(f"a resumed run keeps its own settings; leave out {names}")
     if folder is not None:
-        kind = "series" if is_series(folder) else "run"
-        if kind == "run":
-            read_run(folder)
+        _env_id(folder)
         if _is_done(folder):
-            raise ValueError(f"the {kind} in {str(folder)!r} is finished")
+            raise ValueError(f"the training in {str(folder)!r} is finished")
         return folder
-    env_id = env_id_of(task)
-    records = [
-        path
-        for name in (SERIES_FILE, RUN_FILE)
-        for path in out.glob(f"*/{name}")
-        if read_json(path).get("env_id") == env_id and not _is_done(path.parent)
-    ]
+    env_id, records = env_id_of(task), list[Path]()
+    for path in (*out.glob(f"*/{SERIES_FILE}"), *out.glob(f"*/{RUN_FILE}")):
+        try:
+            if _env_id(path.parent) == env_id and not _is_done(path.parent):
+                records.append(path)
+        except ValueError as error:
+            print(f"left out: {error}", file=sys.stderr)
     if not records:
         raise ValueError(
             f"there is no unfinished training of {task} under {str(out)!r}; start one without --resume"
@@ -167,169 +151,178 @@ def _is_done(folder: Path) -> bool:
 
 def runs_of(folder: Path) -> dict[int, Path]:
     """The runs of a series by seed, or ``ValueError`` if the folder is not one's."""
+    return _read_series(folder)[1]
+
+
+def _read_series(folder: Path) -> tuple[str, dict[int, Path]]:
+    """The environment's id and the runs of a series."""
     record = read_json(folder / SERIES_FILE)
-    if not isinstance(record, dict) or not isinstance(record.get("seeds"), list):
-        raise ValueError(f"{str(folder / SERIES_FILE)!r} is not a series'")
-    return {int(seed): folder / f"seed{seed}" for seed in record["seeds"]}
+    try:
+        env_id = require_choice("env_id", record["env_id"], ALL_ENV_IDS)
+        seeds = [require_count("seed", each, 0, TRAINING_SEEDS - 1) for each in record["seeds"]]
+        if not seeds or len(set(seeds)) < len(seeds):
+            raise ValueError(f"seeds must be different, and one or more, got {seeds}")
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{str(folder / SERIES_FILE)!r} is not a series': {error}") from error
+    return env_id, {seed: folder / f"seed{seed}" for seed in seeds}
+
+
+def _env_id(folder: Path) -> str:
+    """The environment's id of a run or a series, or ``ValueError``."""
+    return _read_series(folder)[0] if is_series(folder) else read_run(folder).env_id
 
 
 def run_series(folder: Path, *, jobs: int = 1, progress: bool = True) -> SeriesResult:
-    """Train whatever is unfinished of a series, one after the other or in processes, and leave curves and table.
+    """Finish the unfinished runs of a series, one after the other or in ``jobs`` processes, and write curves and table.
 
-    Parameters
-    ----------
-    folder : that ``new_series`` made
-    jobs : processes, 1 or more
-    progress : show bars
+    A run that fails does not stop the others.
 
     Raises
     ------
     ValueError
-        If a number is out of its range or a file is damaged.
+        If ``jobs`` is out of its range or a file is damaged.
     RunError
-        If a process fails.
+        If a run fails.
+    BusyError
+        If another process is at work in the folder.
     """
     require_count("jobs", jobs)
     runs = runs_of(folder)
-    unfinished = [place for place in runs.values() if not is_finished(place)]
-    if jobs > 1 and len(unfinished) > 1:
-        run_side_by_side(unfinished, jobs, progress=progress)
-    else:
-        for place in unfinished:
-            run(place, progress=progress)
-    result = _gathered(folder, runs)
-    _draw(folder, runs, result)
-    _write_means(folder / SEEDS_FILE, result)  # last: it marks the series as finished
-    return result
+    with locked(folder):
+        unfinished = [place for place in runs.values() if not is_finished(place)]
+        if jobs > 1 and len(unfinished) > 1:
+            run_side_by_side(unfinished, jobs, progress=progress)
+        else:
+            _run_each(unfinished, progress)
+        return _finished(folder, runs)
 
 
-def run_side_by_side(folders: Sequence[Path], jobs: int, *, progress: bool = True) -> None:
-    """Finish runs, ``jobs`` of them at a time, each in a process of its own, under one bar; an interruption ends the processes.
-
-    Their checkpoints stay.
-
-    Raises
-    ------
-    RunError
-        If a process fails: the others are ended too.
-    """
-    steps = {folder: read_run(folder).settings.steps for folder in folders}
-    waiting = deque(folders)
-    active: dict[Connection, tuple[Path, SpawnProcess]] = {}
-    done = dict.fromkeys(folders, 0)
-    bar = tqdm(total=sum(steps.values()), unit="step", unit_scale=True, disable=not progress)
-    try:
-        while waiting or active:
-            while waiting and len(active) < jobs:
-                folder = waiting.popleft()
-                connection, process = _started(folder)
-                active[connection] = (folder, process)
-            ended = len(folders) - len(active) - len(waiting)
-            bar.set_description(f"trainings done: {ended} of {len(folders)}", refresh=False)
-            for ready in wait(list(active)):
-                assert isinstance(ready, Connection)
-                folder, process = active[ready]
-                try:
-                    done[folder] = ready.recv()
-                except EOFError:
-                    del active[ready]
-                    _require_success(folder, process)
-                    done[folder] = steps[folder]
-            bar.update(sum(done.values()) - bar.n)
-    finally:
-        bar.close()
-        for _, process in active.values():
-            process.terminate()
-        for _, process in active.values():
-            process.join()
+def _run_each(folders: Sequence[Path], progress: bool) -> None:
+    failed: list[str] = []
+    for folder in folders:
+        try:
+            run(folder, progress=progress)
+        except (ValueError, LeanYawError) as error:
+            failed.append(f"the training in {str(folder)!r} failed: {error}")
+    if failed:
+        raise RunError("; ".join(failed))
 
 
-def _started(folder: Path) -> tuple[Connection, SpawnProcess]:
-    # a fresh interpreter: torch and compiled threads do not survive a fork
-    context = multiprocessing.get_context("spawn")
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_run_and_tell, args=(folder, sender), daemon=True)
-    process.start()
-    sender.close()  # so that the end of the process is the end of the pipe
-    return receiver, process
-
-
-def _require_success(folder: Path, process: SpawnProcess) -> None:
-    process.join()
-    if process.exitcode != 0:
-        raise RunError(
-            f"the training in {str(folder)!r} ended with status {process.exitcode}; its own message is above, "
-            "and --resume goes on with it"
-        )
-
-
-def _run_and_tell(folder: Path, sender: Connection) -> None:
-    """The whole life of a process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to decide
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that half-written files are removed
-    run(folder, progress=False, report=lambda steps, _: sender.send(steps))
-
-
-def seeds_table(result: SeriesResult) -> Table:
-    """A table of one series: a metric to a row, with the median and the range over its seeds."""
-    seeds = result.by_seed[0].seeds
-    table = Table(
-        title=f"means over episodes of {len(seeds)} seeds' policies",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        pad_edge=False,
-    )
-    table.add_column("metric", min_width=16)
-    one_by_one = seeds if len(seeds) <= _MOST_COLUMNS else ()
-    for name in ("median", "lowest", "highest", *(f"seed {seed}" for seed in one_by_one)):
-        table.add_column(name, justify="right", no_wrap=True)
-    for each in result.by_seed:
-        values = [each.median, min(each.means), max(each.means)]
-        values += each.means if one_by_one else ()
-        table.add_row(each.metric.replace("_", " "), *(f"{value:.4g}" for value in values))
-    return table
-
-
-def _gathered(folder: Path, runs: Mapping[int, Path]) -> SeriesResult:
-    """What the runs' evaluations say, side by side."""
-    algorithm = read_json(folder / SERIES_FILE)["algorithm"]
-    means: dict[str, dict[str, list[float]]] = {}
-    for place in runs.values():
-        for row in read_json(place / EVALUATION_FILE):
-            mean = float("nan") if row["mean"] is None else float(row["mean"])
-            means.setdefault(row["agent"], {}).setdefault(row["metric"], []).append(mean)
-    own = means.pop(algorithm)
-    return SeriesResult(
-        folder,
-        [SeedMeans(metric, tuple(runs), tuple(values)) for metric, values in own.items()],
-        {
-            metric: {agent: float(np.mean(found[metric])) for agent, found in means.items()}
-            for metric in own
-        },
-    )
-
-
-def _draw(folder: Path, runs: Mapping[int, Path], result: SeriesResult) -> None:
+def _finished(folder: Path, runs: Mapping[int, Path]) -> SeriesResult:
+    """Draw and write what the finished runs of a series come to."""
+    result = _result(runs)
     training = read_run(next(iter(runs.values())))
-    own = next(each for each in result.by_seed if each.metric == "return")
-    words = f"{training.algorithm}, evaluated: {own.median:.1f}\n({min(own.means):.1f} to {max(own.means):.1f})"
+    median, lowest, highest = next(row[1:4] for row in result.rows() if row[0] == RETURN)
+    label = f"{training.algorithm}, evaluated: {median:.1f}\n({lowest:.1f} to {highest:.1f})"
     save_seeds_curves(
         [read_log(place) for place in runs.values()],
         training.algorithm,
-        (words, own.median),
-        result.others["return"],
+        (label, median),
+        result.others[RETURN],
         f"{training.algorithm.upper()} on {training.task}, {len(runs)} seeds",
         training.settings.steps,
         folder / CURVES_FILE,
     )
+    header = ("metric", "median", "lowest", "highest", *(f"seed{seed}" for seed in runs))
+    lines = (",".join(map(str, row)) for row in [header, *result.rows()])
+    write_text(
+        folder / SEEDS_FILE, "".join(f"{line}\n" for line in lines)
+    )  # last: it marks the series as finished
+    return result
 
 
-def _write_means(path: Path, result: SeriesResult) -> None:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    seeds = result.by_seed[0].seeds
-    writer.writerow(("metric", "median", "lowest", "highest", *(f"seed{seed}" for seed in seeds)))
-    for each in result.by_seed:
-        row = (each.metric, each.median, min(each.means), max(each.means), *each.means)
-        writer.writerow(row)
-    write_text(path, text.getvalue())
+def run_side_by_side(folders: Sequence[Path], jobs: int, *, progress: bool = True) -> None:
+    """Finish runs, ``jobs`` of them at a time, each in a process of its own, under one bar.
+
+    A run that fails does not stop the others; an interruption ends all processes, and their checkpoints stay.
+
+    Raises
+    ------
+    RunError
+        If a process fails.
+    """
+    # fresh interpreters: torch and compiled threads do not survive a fork
+    context = multiprocessing.get_context("spawn")
+    done = {folder: context.Value("q", 0) for folder in folders}
+    waiting, failed = deque(folders), list[str]()
+    active: dict[Path, SpawnProcess] = {}
+    bar = tqdm(total=sum(map(_steps, folders)), unit="step", unit_scale=True, disable=not progress)
+    try:
+        while waiting or active:
+            while waiting and len(active) < jobs:
+                folder = waiting.popleft()
+                process = context.Process(
+                    target=_run_in_process, args=(folder, done[folder]), daemon=True
+                )
+                with uninterrupted():
+                    process.start()
+                active[folder] = process
+            ended = len(folders) - len(active) - len(waiting)
+            bar.set_description(f"trainings done: {ended} of {len(folders)}", refresh=False)
+            wait([process.sentinel for process in active.values()], timeout=0.2)
+            for folder in [each for each, process in active.items() if not process.is_alive()]:
+                if (status := active.pop(folder).exitcode) != 0:
+                    failed.append(f"the training in {str(folder)!r} ended with status {status}")
+            bar.update(sum(steps.value for steps in done.values()) - bar.n)
+        if failed:
+            raise RunError(f"{'; '.join(failed)}; the messages are above")
+    finally:
+        bar.close()
+        for process in active.values():
+            process.terminate()
+        for process in active.values():
+            process.join()
+
+
+def _steps(folder: Path) -> int:
+    """Steps of a run; 0 of a damaged one, which its own process reports."""
+    with contextlib.suppress(ValueError):
+        return read_run(folder).settings.steps
+    return 0
+
+
+def _run_in_process(folder: Path, done: Any) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that half-written files are removed
+
+    def report(steps: int, recent: float) -> None:
+        done.value = steps
+
+    with reporting("train"):
+        run(folder, progress=False, report=report)
+
+
+def seeds_table(result: SeriesResult) -> Table:
+    """A table of one series: a metric to a row, with the median and the range over its seeds."""
+    title = f"means over episodes of {len(result.seeds)} seeds' policies"
+    table = Table(title=title, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column("metric", min_width=16)
+    one_by_one = result.seeds if len(result.seeds) <= _MOST_COLUMNS else ()
+    for name in ("median", "lowest", "highest", *(f"seed {seed}" for seed in one_by_one)):
+        table.add_column(name, justify="right", no_wrap=True)
+    for metric, *values in result.rows():
+        shown = values[: 3 + len(one_by_one)]
+        table.add_row(metric.replace("_", " "), *(f"{value:.4g}" for value in shown))
+    return table
+
+
+def _result(runs: Mapping[int, Path]) -> SeriesResult:
+    """What the runs' evaluations say, side by side."""
+    means: dict[str, dict[str, list[float]]] = {}
+    for place in runs.values():
+        try:
+            for row in read_json(place / EVALUATION_FILE):
+                mean = float("nan") if row["mean"] is None else float(row["mean"])
+                means.setdefault(row["agent"], {}).setdefault(row["metric"], []).append(mean)
+        except (KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"the evaluation in {str(place)!r} is damaged: {error}") from error
+    own = means.pop(read_run(next(iter(runs.values()))).algorithm, {})
+    if RETURN not in own or any(len(each) != len(runs) for each in own.values()):
+        raise ValueError(
+            f"the evaluations in {', '.join(map(str, runs.values()))} do not fit together"
+        )
+    others = {
+        metric: {agent: float(np.mean(found[metric])) for agent, found in means.items()}
+        for metric in own
+    }
+    return SeriesResult(tuple(runs), own, others)

@@ -1,13 +1,14 @@
-"""Learners of Stable-Baselines3 on compiled walkers: the environment, the callback, and a state that can be resumed from bit for bit."""
+"""Learners of Stable-Baselines3 on compiled walkers: the environment, the callback, and a state from which a training resumes bit for bit."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 import torch
+from gymnasium import spaces
 from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
@@ -20,40 +21,11 @@ from lean_yaw_env.envs.sb3 import WalkerVecEnv
 
 from ..policies.policy import NORMALISATION_FLOOR, NORMALISED_LIMIT
 from ..policies.policy_files import task_of
-from .experience import named_arrays
-from .learner import LearnerSettings, float_array, optimizer_arrays, restore_optimizer
-from .recorder import Arrays, EndedEpisode, Recorder, restoring, under
+from ..seeds import training_seed
+from .learner import LearnerSettings, captured, float_array, restore
+from .recorder import EndedEpisode, Recorder, State, require_like
 
-
-@dataclass(frozen=True)
-class Falling:
-    """A learning rate that falls linearly to a share of itself, called with the share of the training that is left."""
-
-    first: float
-    last_share: float
-
-    @classmethod
-    def of(cls, settings: LearnerSettings) -> Falling:
-        return cls(settings.learning_rate, settings.final_learning_rate)
-
-    def __call__(self, progress_left: float) -> float:
-        return self.first * (self.last_share + (1.0 - self.last_share) * progress_left)
-
-
-def training_environment(
-    env_id: str, settings: LearnerSettings, options: EnvOptions, threads: int
-) -> tuple[VecNormalize, WalkerVecEnv]:
-    """Walkers at a task under a training's options, whose observations and rewards are normalised; both wrapper and walkers."""
-    walkers = WalkerVecEnv(
-        settings.walkers, task_of(env_id), threads=threads, **vars(settings.walked_under(options))
-    )
-    normalised = VecNormalize(
-        walkers,
-        gamma=settings.typical_discount,
-        clip_obs=NORMALISED_LIMIT,
-        epsilon=NORMALISATION_FLOOR,
-    )
-    return normalised, walkers
+_GENERATOR_WORDS = 624  # of the Mersenne Twister
 
 
 class TimedBuffer(Protocol):
@@ -64,7 +36,7 @@ class TimedBuffer(Protocol):
 
 
 class _Callback(BaseCallback):
-    """Tells the recorder of episodes and updates, and the buffer of the steps' durations."""
+    """Passes episodes and updates to the recorder, and the steps' durations to the buffer."""
 
     def __init__(self, recorder: Recorder, buffer: TimedBuffer) -> None:
         super().__init__()
@@ -82,7 +54,7 @@ class _Callback(BaseCallback):
         for i in np.flatnonzero(self.locals["dones"]):
             info = self.locals["infos"][i]
             episode = info["episode"]
-            survived = info["TimeLimit.truncated"]
+            survived = info["TimeLimit.truncated"] or bool(info.get("is_success", False))
             self._recorder.add(
                 EndedEpisode(self.num_timesteps, episode["r"], episode["l"], survived)
             )
@@ -90,17 +62,9 @@ class _Callback(BaseCallback):
 
 
 class StableBaselinesLearner:
-    """A learner around a model of Stable-Baselines3 that trains on a ``WalkerVecEnv`` within a ``VecNormalize``.
+    """A learner around a model of Stable-Baselines3 that trains on a ``WalkerVecEnv`` within a ``VecNormalize``; see ``learner.Learner``.
 
-    An algorithm says what its ``layers`` are called, and captures what it has beside networks, optimisers and walkers.
-
-    Parameters
-    ----------
-    model : BaseAlgorithm
-    buffer : TimedBuffer
-        Of the model.
-    optimizers : the model's, by the names that they are kept under
-    total : environment steps of the training
+    An algorithm makes its model and names its parts; it captures what it has beside networks, optimisers and walkers.
     """
 
     activation: str
@@ -108,26 +72,72 @@ class StableBaselinesLearner:
 
     def __init__(
         self,
-        model: BaseAlgorithm,
-        buffer: TimedBuffer,
-        optimizers: Mapping[str, Optimizer],
-        total: int,
+        env_id: str,
+        settings: LearnerSettings,
+        seed: int,
+        options: EnvOptions,
+        threads: int,
+        tensorboard: Path | None,
     ) -> None:
-        self.model = model
-        self._buffer = buffer
-        self._optimizers = optimizers
-        self._total = total
-        normaliser = model.get_vec_normalize_env()
-        assert normaliser is not None and isinstance(normaliser.unwrapped, WalkerVecEnv)
-        self._normaliser, self._walkers = normaliser, normaliser.unwrapped
+        self._first = training_seed(seed)
+        self.options = options
+        self._total, self._depth = settings.steps, len(settings.hidden)
+        walking = vars(settings.training_options(options))
+        self._walkers = WalkerVecEnv(
+            settings.walkers, self.environment(env_id), threads=threads, **walking
+        )
+        self._normaliser = self.normalised(self._walkers, settings)
+        self.model = self.make_model(
+            settings,
+            env=self._normaliser,
+            learning_rate=lambda left: settings.learning_rate * settings.learning_rate_share(left),
+            tensorboard_log=None if tensorboard is None else str(tensorboard),
+            seed=seed,
+            device="cpu",
+        )
+        self._walkers.seed(self._first)  # in place of the policy's seed, which SB3 gives them too
+        # what SB3 has from the first step on, so that a state has the same parts before it
+        self.model._last_obs = self.model._last_original_obs = self._no_observations()
+        self.model._last_episode_starts = np.ones(settings.walkers, dtype=np.bool_)
+
+    def environment(self, env_id: str) -> str:
+        """The task or the environment's id that the walkers train at."""
+        return task_of(env_id)
+
+    def normalised(self, walkers: WalkerVecEnv, settings: LearnerSettings) -> VecNormalize:
+        """The walkers with normalised observations and rewards."""
+        return VecNormalize(
+            walkers,
+            gamma=settings.typical_discount,
+            clip_obs=NORMALISED_LIMIT,
+            epsilon=NORMALISATION_FLOOR,
+        )
+
+    def make_model(self, settings: Any, **common: Any) -> BaseAlgorithm:
+        """The model of these settings; ``common`` are arguments that all models take."""
+        raise NotImplementedError
+
+    @property
+    def buffer(self) -> TimedBuffer:
+        """The model's experience."""
+        raise NotImplementedError
+
+    @property
+    def optimizers(self) -> Mapping[str, Optimizer]:
+        """The model's optimisers by name."""
+        raise NotImplementedError
+
+    def layers(self) -> dict[str, str]:
+        """SB3's names of the policy's layers, by the names that ``Policy`` takes."""
+        raise NotImplementedError
 
     @property
     def steps(self) -> int:
         return self.model.num_timesteps
 
     def learn(self, recorder: Recorder) -> None:
-        """Train to the end and close the environment; see ``Learner``."""
-        callback, left = _Callback(recorder, self._buffer), self._total - self.steps
+        """Train to the end and close the environment."""
+        callback, left = _Callback(recorder, self.buffer), self._total - self.steps
         try:
             if left > 0:
                 # SB3 counts what is left from where the model is, and so keeps the schedule's end
@@ -135,12 +145,8 @@ class StableBaselinesLearner:
         finally:
             self._normaliser.close()
 
-    def layers(self) -> dict[str, str]:
-        """SB3's names of the policy's layers, by the names that ``Policy`` takes."""
-        raise NotImplementedError
-
     def weights(self) -> dict[str, NDArray[np.float32]]:
-        """The policy's numbers, with the statistics that normalise its observations; see ``Learner``."""
+        """The policy's weights, with the statistics that normalise its observations."""
         tensors = self.model.policy.state_dict()
         features = tensors[f"{self.layers()['layers.0']}.weight"].shape[1]
         moments = self._moments().get("observations", RunningMeanStd(shape=(features,)))
@@ -153,83 +159,56 @@ class StableBaselinesLearner:
                 weights[f"{name}.{part}"] = float_array(tensors[f"{theirs}.{part}"])
         return weights
 
-    def capture(self) -> Arrays:
-        """Networks, optimisers, statistics, walkers and random numbers; see ``Learner``."""
-        model, normaliser = self.model, self._normaliser
-        arrays: Arrays = {
-            "count.steps": np.array(model.num_timesteps),
-            "count.updates": np.array(model._n_updates),
-            "last.starts": np.array(model._last_episode_starts),
-            "normaliser.returns": normaliser.returns,
-            "random.torch": torch.get_rng_state().numpy(),
+    def capture(self) -> State:
+        """Networks, optimisers, statistics, walkers and random numbers."""
+        model, random = self.model, np.random.get_state(legacy=False)  # noqa: NPY002 - SB3 draws from it
+        return {
+            **captured({"policy": model.policy}, self.optimizers),
+            **{name: vars(moments) for name, moments in self._moments().items()},
+            "steps": model.num_timesteps,
+            "updates": model._n_updates,
+            "last": {"observations": model._last_obs, "starts": model._last_episode_starts},
+            "normaliser": {"returns": self._normaliser.returns},
+            "walkers": self._walkers.snapshot(),
+            "torch": torch.get_rng_state(),
+            "numpy": {key: random[key] for key in ("state", "has_gauss", "gauss")},
         }
-        arrays |= captured_observations("last.observations", model._last_obs)
-        arrays |= {
-            f"policy.{k}": v.detach().cpu().numpy() for k, v in model.policy.state_dict().items()
-        }
-        for name, optimizer in self._optimizers.items():
-            arrays |= {f"{name}.{k}": v for k, v in optimizer_arrays(optimizer).items()}
-        for name, moments in self._moments().items():
-            arrays |= {
-                f"{name}.{k}": np.asarray(getattr(moments, k)) for k in ("mean", "var", "count")
-            }
-        arrays |= {f"walkers.{k}": v for k, v in self._walkers.snapshot().items()}
-        return arrays | _numpy_random()
 
-    def restore(self, arrays: Arrays) -> None:
-        """Bring the model to a captured state; see ``Learner``."""
+    def restore(self, state: Any) -> None:
+        """Bring the model to a captured state."""
         model = self.model
-        with restoring():
-            names = model.policy.state_dict()
-            policy = {k: torch.from_numpy(arrays[f"policy.{k}"].copy()) for k in names}
-            model.policy.load_state_dict(policy)
-            for name, optimizer in self._optimizers.items():
-                restore_optimizer(optimizer, under(f"{name}.", arrays))
-            for name, moments in self._moments().items():
-                moments.mean = arrays[f"{name}.mean"].copy()
-                moments.var = arrays[f"{name}.var"].copy()
-                moments.count = float(arrays[f"{name}.count"])
-            self._normaliser.returns = arrays["normaliser.returns"].copy()
-            self._walkers.restore(under("walkers.", arrays))
-            model.num_timesteps = int(arrays["count.steps"])
-            model._n_updates = int(arrays["count.updates"])
-            model._last_obs = restored_observations("last.observations", arrays)
-            model._last_episode_starts = arrays["last.starts"].copy()
-            torch.set_rng_state(torch.from_numpy(arrays["random.torch"].copy()))
-            _restore_numpy_random(arrays)
+        self._walkers.reset()
+        self._walkers.seed(
+            self._first
+        )  # a training that is resumed before its first step resets them again
+        require_like(self.capture(), state)
+        restore({"policy": model.policy}, self.optimizers, state)
+        for name, moments in self._moments().items():
+            moments.mean, moments.var = state[name]["mean"], state[name]["var"]
+            moments.count = float(state[name]["count"])
+            if moments.count < 0.0 or np.any(np.less(moments.var, 0.0)):
+                raise ValueError(f"{name} must have a variance of 0 or more")
+        self._normaliser.returns = state["normaliser"]["returns"]
+        self._walkers.restore(state["walkers"])
+        model.num_timesteps, model._n_updates = int(state["steps"]), int(state["updates"])
+        model._last_obs, model._last_episode_starts = (
+            state["last"][k] for k in ("observations", "starts")
+        )
+        if not 0 <= int(state["numpy"]["state"]["pos"]) <= _GENERATOR_WORDS:
+            raise ValueError("numpy/state/pos must be a place in the generator's state")
+        torch.set_rng_state(torch.from_numpy(state["torch"]))
+        np.random.set_state({"bit_generator": "MT19937", **state["numpy"]})  # noqa: NPY002
+
+    def _no_observations(self) -> Any:
+        space, n = self._walkers.observation_space, self._walkers.num_envs
+        if isinstance(space, spaces.Dict):
+            return {
+                key: np.zeros((n, *(each.shape or ())), each.dtype) for key, each in space.items()
+            }
+        return np.zeros((n, *(space.shape or ())), space.dtype)
 
     def _moments(self) -> dict[str, Any]:
-        returns = {"returns": self._normaliser.ret_rms}
-        return (
-            {"observations": self._normaliser.obs_rms} | returns
-            if self._normaliser.norm_obs
-            else returns
-        )
-
-
-def captured_observations(name: str, observations: Any) -> Arrays:
-    """Copies of observations, each array of a dictionary under a name of its own."""
-    return {key: np.array(each) for key, each in named_arrays(name, observations).items()}
-
-
-def restored_observations(name: str, arrays: Arrays) -> Any:
-    """What ``captured_observations`` was given."""
-    if name in arrays:
-        return arrays[name].copy()
-    return {key: each.copy() for key, each in under(f"{name}.", arrays).items()}
-
-
-def _numpy_random() -> Arrays:
-    """The state of numpy's shared generator, which SB3 shuffles samples by."""
-    _, keys, position, has_gauss, gauss = np.random.get_state(legacy=True)  # noqa: NPY002
-    return {
-        "random.numpy": np.asarray(keys),
-        "random.numpy_position": np.array([position, has_gauss]),
-        "random.numpy_gauss": np.array(gauss),
-    }
-
-
-def _restore_numpy_random(arrays: Arrays) -> None:
-    position, has_gauss = (int(v) for v in arrays["random.numpy_position"])
-    gauss = float(arrays["random.numpy_gauss"])
-    np.random.set_state(("MT19937", arrays["random.numpy"], position, has_gauss, gauss))  # noqa: NPY002
+        found: dict[str, Any] = {"returns": self._normaliser.ret_rms}
+        if self._normaliser.norm_obs:
+            found["observations"] = self._normaliser.obs_rms
+        return found

@@ -26,13 +26,13 @@ ACTIVATIONS: dict[str, Callable[[NDArray[np.float32]], NDArray[np.float32]]] = {
     "tanh": np.tanh,
     "relu": lambda x: np.maximum(x, np.float32(0.0)),
 }
-"""What stands between two layers."""
+"""Between two layers."""
 
 OUTPUTS: dict[str, Callable[[NDArray[np.float32]], NDArray[np.float32]]] = {
     "clip": lambda x: np.clip(x, np.float32(-1.0), np.float32(1.0)),
     "tanh": np.tanh,
 }
-"""What keeps the last layer's numbers within the action space."""
+"""After the last layer: keeps actions within the action space."""
 
 NORMALISATION_FLOOR = 1e-8
 """Added to an observation's variance, as Stable-Baselines3's ``VecNormalize`` does."""
@@ -40,7 +40,6 @@ NORMALISED_LIMIT = 10.0
 """Bound of a normalised observation, as there."""
 LOG_STD_LIMITS = (np.float32(-20.0), np.float32(2.0))
 """Bounds of a logarithm of a deviation that a layer gives, as in Stable-Baselines3's SAC."""
-
 
 _PACKAGES = ("numpy", "scipy", "numba", "gymnasium", "torch", "stable-baselines3")
 
@@ -100,14 +99,12 @@ class Policy:
 
     Parameters
     ----------
-    card : PolicyCard
+    card : what the policy is
     weights : float32 arrays by name
-        ``layers.<k>.weight`` (outputs, inputs) and ``layers.<k>.bias`` (outputs,) for k = 0, 1, ... The statistics of observations that
-        normalise them: ``observation_mean`` and ``observation_variance`` (features,). ``log_std`` (2,), the logarithm of the
-        standard deviation of actions that are drawn, before they are kept in bounds; or ``log_std.weight`` and ``log_std.bias``,
-        a layer beside the last that gives it.
-    generator : numpy Generator, optional
-        Draws actions for ``deterministic=False``; seeded by the card's seed otherwise.
+        ``layers.<k>.weight`` (outputs, inputs) and ``layers.<k>.bias`` (outputs,) for k = 0, 1, ...; ``observation_mean`` and
+        ``observation_variance`` (features,), which normalise observations; ``log_std`` (2,), the logarithm of the standard deviation of
+        actions that are drawn, before they are kept in bounds, or ``log_std.weight`` and ``log_std.bias``, a layer beside the last that gives it.
+    generator : draws actions for ``deterministic=False``; by default seeded by the card's seed
 
     Raises
     ------

@@ -9,7 +9,7 @@ from typing import Any
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.extras import needs_extra
-from lean_yaw_env.files import read_json, write_json, written_whole
+from lean_yaw_env.files import read_json, read_regular, write_json, written_whole
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.registration import ALL_ENV_IDS, NAMESPACE, TASK_IDS
 
@@ -24,13 +24,9 @@ SHIPPED = Path(__file__).parents[1] / "trained"
 """Agents that come with the package, as ``<Task>-v<version>/<algorithm>/seed<k>/``."""
 DEFAULT_ALGORITHM = "ppo"
 """Whose agent is meant where none is named."""
+_MOST_WEIGHTS = 2**28  # bytes: a thousand times the largest that is trained here
 
-_KEYS: dict[str, type] = {
-    "format": str,
-    "format_version": int,
-    "env_id": str,
-    "options": dict,
-    "observation": dict,
+_CARD_KEYS: dict[str, type] = {
     "algorithm": str,
     "activation": str,
     "output": str,
@@ -38,6 +34,15 @@ _KEYS: dict[str, type] = {
     "settings": dict,
     "training": dict,
     "versions": dict,
+}
+"""Fields of a ``PolicyCard`` that the file holds as they are."""
+_KEYS: dict[str, type] = {
+    "format": str,
+    "format_version": int,
+    "env_id": str,
+    "options": dict,
+    "observation": dict,
+    **_CARD_KEYS,
     "weights_sha256": str,
 }
 
@@ -53,24 +58,16 @@ def save(policy: Policy, folder: Path) -> None:
     data = _safetensors().numpy.save(policy.weights)
     with written_whole(folder / WEIGHTS_FILE) as temporary:
         temporary.write_bytes(data)
-    write_json(
-        folder / CARD_FILE,
-        {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "env_id": card.env_id,
-            "options": options_to_plain(card.options),
-            "observation": asdict(card.layout),
-            "algorithm": card.algorithm,
-            "activation": card.activation,
-            "output": card.output,
-            "seed": card.seed,
-            "settings": dict(card.settings),
-            "training": dict(card.training),
-            "versions": dict(card.versions),
-            "weights_sha256": hashlib.sha256(data).hexdigest(),
-        },
-    )
+    record = {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "env_id": card.env_id,
+        "options": options_to_plain(card.options),
+        "observation": asdict(card.layout),
+        **{key: getattr(card, key) for key in _CARD_KEYS},
+        "weights_sha256": hashlib.sha256(data).hexdigest(),
+    }
+    write_json(folder / CARD_FILE, record)
 
 
 def load(
@@ -80,17 +77,14 @@ def load(
     algorithm: str | None = None,
     seed: int | None = None,
 ) -> Policy:
-    """Load a policy; reads numbers and names only and runs no code from the files.
+    """Load a policy: numbers and names only; no code from the files is run.
 
     Parameters
     ----------
     source : an environment's id, for the agent that comes with the package, or a folder
-    env_id : str, optional
-        The environment that the policy is wanted for.
-    algorithm : str, optional
-        That trained the policy; of the package's agents PPO's otherwise, and of a folder's whatever it is.
-    seed : int, optional
-        Which of the package's agents for that id and algorithm; the lowest seed there is otherwise.
+    env_id : the environment that the policy is wanted for; any by default
+    algorithm : that trained the policy; by default PPO for the package's agents, and any for a folder
+    seed : of the package's agent for that id and algorithm; the lowest one by default
 
     Raises
     ------
@@ -124,16 +118,18 @@ def load(
 
 def shipped_seeds(env_id: str, algorithm: str = DEFAULT_ALGORITHM) -> list[int]:
     """The seeds, in order, of the agents that come with the package for an environment's id and an algorithm; empty for none."""
-    return [seed for seed, _ in _shipped(env_id, algorithm)]
+    folders = shipping_folder(env_id, algorithm, 0).parent.glob("seed*")
+    names = [folder.name.removeprefix("seed") for folder in folders]
+    return sorted(int(name) for name in names if name.isdecimal())
 
 
 def shipped_folder(
     env_id: str, algorithm: str = DEFAULT_ALGORITHM, seed: int | None = None
 ) -> Path:
-    """The folder of an agent that comes with the package, or ``PolicyFileError`` if there is none."""
-    for number, folder in _shipped(env_id, algorithm):
-        if seed is None or number == seed:
-            return folder
+    """The folder of an agent that comes with the package, of the lowest seed by default, or ``PolicyFileError`` if there is none."""
+    for each in shipped_seeds(env_id, algorithm):
+        if seed is None or each == seed:
+            return shipping_folder(env_id, algorithm, each)
     wanted = "" if seed is None else f" with seed {seed}"
     raise PolicyFileError(
         f"no {algorithm} agent for {env_id}{wanted} comes with this package; train one by train.py"
@@ -141,24 +137,12 @@ def shipped_folder(
 
 
 def shipping_folder(env_id: str, algorithm: str, seed: int) -> Path:
-    """Where an agent of the package is kept, whether it is there or not."""
-    return _shipped_home(env_id, algorithm) / f"seed{seed}"
-
-
-def _shipped(env_id: str, algorithm: str) -> list[tuple[int, Path]]:
-    """Seeds and folders of the package's agents."""
-    numbered = [
-        (folder.name.removeprefix("seed"), folder)
-        for folder in _shipped_home(env_id, algorithm).glob("seed*")
-    ]
-    return sorted((int(number), folder) for number, folder in numbered if number.isdecimal())
-
-
-def _shipped_home(env_id: str, algorithm: str) -> Path:
+    """Where an agent of the package is kept, whether it is there or not; ``PolicyFileError`` for a bad name."""
     try:
-        return SHIPPED / env_id.removeprefix(f"{NAMESPACE}/") / require_algorithm(algorithm)
+        home = SHIPPED / env_id.removeprefix(f"{NAMESPACE}/") / require_algorithm(algorithm)
     except ValueError as error:
         raise PolicyFileError(str(error)) from error
+    return home / f"seed{seed}"
 
 
 def require_env_id(env_id: str) -> str:
@@ -190,12 +174,12 @@ def options_to_plain(options: EnvOptions) -> dict[str, Any]:
 
 def options_from_plain(plain: dict[str, Any]) -> EnvOptions:
     """The options that ``options_to_plain`` wrote, or ``ValueError``."""
-    values = dict(plain)
+    values = dict(_known("options", plain, EnvOptions))
     if "parameters" in values:
         values["parameters"] = WalkerParameters(
             **_known("parameters", values["parameters"], WalkerParameters)
         )
-    return EnvOptions(**_known("options", values, EnvOptions))
+    return EnvOptions(**values)
 
 
 def _changed(record: Any) -> dict[str, Any]:
@@ -231,30 +215,18 @@ def _read_card(path: Path) -> tuple[PolicyCard, str]:
     env_id = require_env_id(values["env_id"])
     options = options_from_plain(values["options"])
     layout = ObservationLayout.of(task_of(env_id), options)
-    if values["observation"] != _listed(asdict(layout)):
+    now = {key: list(value) for key, value in asdict(layout).items()}
+    if values["observation"] != now:
         raise ValueError(
-            f"it was trained on other observations, {values['observation']}, than {env_id} now gives, {_listed(asdict(layout))}; "
-            "train a policy anew"
+            f"it was trained on other observations, {values['observation']}, than {env_id} now gives, {now}; train a policy anew"
         )
-    card = PolicyCard(
-        env_id=env_id,
-        options=options,
-        layout=layout,
-        **{key: values[key] for key in _CARD_VALUES},
-    )
+    card = PolicyCard(env_id, options, layout, **{key: values[key] for key in _CARD_KEYS})
     return card, values["weights_sha256"]
-
-
-_CARD_VALUES = ("algorithm", "activation", "output", "seed", "settings", "training", "versions")
-
-
-def _listed(values: dict[str, Any]) -> dict[str, Any]:
-    return {key: list(value) for key, value in values.items()}
 
 
 def _read_weights(path: Path, digest: str) -> dict[str, Any]:
     try:
-        data = path.read_bytes()
+        data = read_regular(path, _MOST_WEIGHTS)
     except OSError as error:
         raise ValueError(f"{path.name} cannot be read: {error}") from error
     if hashlib.sha256(data).hexdigest() != digest:
@@ -264,6 +236,8 @@ def _read_weights(path: Path, digest: str) -> dict[str, Any]:
         return library.numpy.load(data)
     except library.SafetensorError as error:
         raise ValueError(f"{path.name} is damaged: {error}") from error
+    except (KeyError, AttributeError, TypeError) as error:  # numpy has no such numbers
+        raise ValueError(f"{path.name} must hold float32 numbers, got {error}") from error
 
 
 def _safetensors() -> Any:

@@ -19,10 +19,14 @@ from ..controllers.mpc import MpcController
 from ..controllers.mpc_settings import MpcSettings
 from ..controllers.simple import HeadingFeedback, HeadingGains
 from ..learning.algorithms import settings_for
-from ..learning.ppo import PPOSettings
-from ..learning.sac import SACSettings
 from ..registry import agent_entry
 from ..settings import tuned, value_at, with_values
+
+Range = tuple[float, float, bool]
+"""From, to, and whether equal ratios are equal steps; whole numbers if its ends are."""
+Entry = Range | list[Any]
+"""What a trial draws from: a range or a list of choices."""
+Values = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -31,13 +35,12 @@ class Space:
 
     Attributes
     ----------
-    settings : as they are; trials begin with them
+    settings : the present ones, with which trials begin
     start : the values of a trial that stand for them
-    suggest : a trial's settings
-        Raises ``ValueError`` where the values make none.
-    is_continuous : whether all values are real numbers: CMA-ES is for those
-    episodes : that settings are scored on, where no other number is asked for
-    make : a controller of options and settings; None for an agent that is trained
+    suggest : returns a trial's settings, or raises ``ValueError`` where its values are no valid settings
+    is_continuous : whether all values are real numbers, as CMA-ES needs
+    episodes : number of episodes that settings are scored on by default
+    make : makes a controller of options and settings; None for an agent that is trained
     options : of the environments that settings are scored in
     """
 
@@ -69,16 +72,37 @@ def space_of(agent: str, task: str, horizon: float | None = None) -> Space:
     return _gain_space(agent, task, horizon)
 
 
+def _drawn(trial: Trial, entries: Mapping[str, Entry], start: Mapping[str, Any]) -> Values:
+    """A trial's values; the present value is one more choice if it is none of the choices."""
+    values: Values = {}
+    for path, entry in entries.items():
+        if isinstance(entry, list):
+            choices = entry if start[path] in entry else [*entry, start[path]]
+            values[path] = trial.suggest_categorical(path, choices)
+        elif isinstance(entry[0], int):
+            values[path] = trial.suggest_int(path, entry[0], int(entry[1]), log=entry[2])
+        else:
+            values[path] = trial.suggest_float(path, entry[0], entry[1], log=entry[2])
+    return values
+
+
+def _starting(settings: Any, ranges: Mapping[str, Range]) -> dict[str, float]:
+    """The present numbers, moved into their ranges; the middle of the range where there is none yet."""
+    start: dict[str, float] = {}
+    for path, (low, high, by_ratio) in ranges.items():
+        middle = math.sqrt(low * high) if by_ratio else 0.5 * (low + high)
+        value = value_at(settings, path)
+        start[path] = min(max(middle if value is None else value, low), high)
+    return start
+
+
 # ---- gains of feedback and lqr
 
-Range = tuple[float, float, bool]
-"""From, to, and whether equal ratios are equal steps."""
-
 DIGITS = 3
-"""That are kept of each number."""
+"""Digits that are kept of each number."""
 _REACH = 0.45
-"""Of the first trials to either side of the settings as they are, as a share of the range. CMA-ES begins in the middle of what it is given,
-with a standard deviation of a sixth of it: with the settings as they are, and 0.15 of the range."""
+"""How far trials lie from the present settings at most, to either side, as a share of the range. CMA-ES begins in the middle of what it is given,
+with a standard deviation of a sixth of it: with the present settings, and 0.15 of the range."""
 
 _LOOP: dict[str, Range] = {
     "weights.heading": (0.01, 3.0, True),
@@ -93,6 +117,7 @@ _SPEED_COST: dict[str, Range] = {"weights.speed": (0.01, 10.0, True)}
 _LIMIT: dict[str, Range] = {"largest_error": (0.1, 3.0, True)}
 _ANGLE: dict[str, Range] = {"inter_leg_angle": (0.15, 0.45, False)}
 _TURN = _LIMIT | {"turning_angle": (0.2, 0.45, False), "turning_error": (0.05, 1.0, True)}
+_GUIDED = {f"loop.{path}": entry for path, entry in (_LOOP | _ANGLE | _TURN).items()}
 _PUMPING: dict[str, Range] = {"pumping.downhill": (0.0, 0.045, False)}
 _UPHILL: dict[str, Range] = {"pumping.uphill": (0.01, 0.05, False)}
 _STEERING: dict[str, Range] = {
@@ -103,10 +128,6 @@ _STEERING: dict[str, Range] = {
     "inter_leg_angle": (-0.15, 0.15, False),
 }
 _SPEED: dict[str, Range] = {"speed": (-2.0, 0.0, False), "speed_error": (-1.0, 1.0, False)}
-
-
-def _within_loop(ranges: dict[str, Range]) -> dict[str, Range]:
-    return {f"loop.{path}": entry for path, entry in ranges.items()}
 
 
 RANGES: dict[tuple[str, str], dict[str, Range]] = {
@@ -120,10 +141,8 @@ RANGES: dict[tuple[str, str], dict[str, Range]] = {
     ("lqr", "Level"): _LOOP | _ANGLE | _TURN | _PUMPING,
     ("lqr", "Walk"): _LOOP | _ANGLE,
     ("lqr", "Push"): _LOOP | _ANGLE | _PUMPING,
-    ("lqr", "Slalom"): _within_loop(_LOOP | _ANGLE | _TURN)
-    | {"ahead": (0.0, 6.0, False), "approach": (1.0, 30.0, True)},
-    ("lqr", "Waypoint"): _within_loop(_LOOP | _ANGLE | _TURN)
-    | {"radius": (1.0, 8.0, True), "persistence": (0.0, 2.0, False)},
+    ("lqr", "Slalom"): _GUIDED | {"ahead": (0.0, 6.0, False), "approach": (1.0, 30.0, True)},
+    ("lqr", "Waypoint"): _GUIDED | {"radius": (1.0, 8.0, True), "persistence": (0.0, 2.0, False)},
 }
 """Of the numbers that are tuned, by agent and task and by their paths in the settings."""
 
@@ -139,36 +158,24 @@ def _gain_space(agent: str, task: str, horizon: float | None) -> Space:
     if horizon is not None:
         options = tuple(replace(each, horizon=horizon) for each in options)
     ranges = RANGES[agent, task]
-    if agent == "feedback":
-        settings: Any = tuned(agent, task, HeadingGains())
-
-        def make(options: EnvOptions, gains: Any) -> Agent:
-            return HeadingFeedback(task, options, gains)
-    else:
-        kind = regulator_for(task, EnvOptions())
-        settings = tuned(agent, task, kind.Settings())
-
-        def make(options: EnvOptions, gains: Any) -> Agent:
-            return kind(task, options, gains)
-
-    start = {path: _starting(value_at(settings, path), entry) for path, entry in ranges.items()}
+    kind: Any = HeadingFeedback if agent == "feedback" else regulator_for(task, EnvOptions())
+    default: Any = HeadingGains() if agent == "feedback" else kind.Settings()
+    settings = tuned(agent, task, default)
+    start = _starting(settings, ranges)
 
     def suggest(trial: Trial) -> Any:
-        values = {path: _suggested(trial, path, start[path], ranges[path]) for path in ranges}
-        return with_values(settings, values)
+        return with_values(
+            settings, {path: _near(trial, path, start[path], ranges[path]) for path in ranges}
+        )
+
+    def make(options: EnvOptions, gains: Any) -> Agent:
+        return kind(task, options, gains)
 
     return Space(settings, start, suggest, True, 128, make, options)
 
 
-def _starting(value: float | None, entry: Range) -> float:
-    """The number to begin with, within the range; its middle where there is none yet."""
-    low, high, by_ratio = entry
-    if value is None:
-        return math.sqrt(low * high) if by_ratio else 0.5 * (low + high)
-    return min(max(value, low), high)
-
-
-def _suggested(trial: Trial, path: str, start: float, entry: Range) -> float:
+def _near(trial: Trial, path: str, start: float, entry: Range) -> float:
+    """A trial's number around the present one."""
     low, high, by_ratio = entry
     if by_ratio:
         reach = (high / low) ** _REACH
@@ -177,17 +184,16 @@ def _suggested(trial: Trial, path: str, start: float, entry: Range) -> float:
         reach = _REACH * (high - low)
         value = trial.suggest_float(path, start - reach, start + reach)
     value = min(max(value, low), high)
-    # gaits are found anew for each offset that pumps, so that few of those are tried
+    # gaits are computed anew for each offset that pumps, so that few of those are tried
     return round(value, 3) if "pumping" in path else float(f"{value:.{DIGITS}g}")
 
 
 # ---- predictive control
 
 STEPS_PER_DECISION = 2400
-"""Walked by all plans together, near 2 ms on one core: every trial may walk as many, so that the search gets better and not the time it takes."""
+"""Walking steps of all plans together, near 2 ms on one core: the same for every trial, so that the search improves the plans and not the time they take."""
 _KNOTS = (0.0, 0.15, 0.35, 0.7)  # shares of the horizon
 _PUMPING_TASKS = ("Push", "UTurn", "Level")  # where the masses may change sides from step to step
-
 
 _PLANS: dict[str, Range] = {
     "horizon": (1, 24, False),
@@ -211,122 +217,75 @@ def _mpc_space(task: str, horizon: float | None) -> Space:
     if not settings.scenarios:
         left_out |= {"scenarios", "push_scale"}
     ranges = {path: entry for path, entry in _PLANS.items() if path not in left_out}
-    start = {path: _starting(value_at(settings, path), entry) for path, entry in ranges.items()}
-    return Space(
-        settings,
-        start,
-        lambda trial: suggested_mpc(trial, settings, ranges),
-        False,
-        24,
-        lambda options, chosen: MpcController(task, options, chosen),
-        (EnvOptions(horizon=horizon),),
-    )
+    start = _starting(settings, ranges)
 
+    def suggest(trial: Trial) -> MpcSettings:
+        values = _drawn(trial, ranges, start)
+        steps = values["horizon"] + values["tail"]
+        draws = max(values.get("scenarios", settings.scenarios), 1)
+        samples = min(STEPS_PER_DECISION // (values["iterations"] * steps * draws), 200)
+        values |= {
+            "knots": tuple(sorted({int(share * values["horizon"]) for share in _KNOTS})),
+            "samples": samples,
+            "elites": max(2, samples // 6),
+        }
+        return with_values(settings, values)
 
-def suggested_mpc(trial: Trial, settings: MpcSettings, ranges: Mapping[str, Range]) -> MpcSettings:
-    """The predictive controller's settings of a trial.
+    def make(options: EnvOptions, chosen: MpcSettings) -> Agent:
+        return MpcController(task, options, chosen)
 
-    Raises
-    ------
-    ValueError
-        If they leave too few plans to choose from.
-    """
-    values: dict[str, Any] = {
-        path: trial.suggest_int(path, int(low), int(high))
-        if isinstance(low, int)
-        else trial.suggest_float(path, low, high, log=by_ratio)
-        for path, (low, high, by_ratio) in ranges.items()
-    }
-    steps = values["horizon"] + values["tail"]
-    draws = max(values.get("scenarios", settings.scenarios), 1)
-    samples = min(STEPS_PER_DECISION // (values["iterations"] * steps * draws), 200)
-    values |= {
-        "knots": tuple(sorted({int(share * values["horizon"]) for share in _KNOTS})),
-        "samples": samples,
-        "elites": max(2, samples // 6),
-    }
-    return with_values(settings, values)
+    return Space(settings, start, suggest, False, 24, make, (EnvOptions(horizon=horizon),))
 
 
 # ---- learners
 
-_LAYERS = ("32x32", "64x64", "128x128")
+_LEARNERS: dict[str, dict[str, Entry]] = {
+    "ppo": {
+        "steps_per_update": [32, 64, 128, 256],
+        "minibatches": [2, 4, 8, 16, 32],
+        "epochs": (1, 12, False),
+        "learning_rate": (2e-4, 1e-2, True),
+        "time_constant": (6.0, 100.0, True),
+        "gae_lambda": (0.8, 1.0, False),
+        "clip_range": (0.05, 0.4, False),
+        "entropy": (0.0, 0.02, False),
+        "initial_log_std": (-3.0, 0.0, False),
+        "hidden": ["32x32", "64x64", "128x128"],
+    },
+    "sac": {
+        "gradient_steps": (1, 16, True),
+        "batch_size": [128, 256, 512, 1024],
+        "learning_rate": (1e-4, 5e-3, True),
+        "time_constant": (6.0, 100.0, True),
+        "target_rate": (1e-3, 5e-2, True),
+        "target_entropy": (-8.0, 0.0, False),
+        "initial_entropy_weight": (1e-3, 1.0, True),
+        "hidden": ["32x32", "64x64", "128x128"],
+    },
+}
+"""Steps, walkers and pushes stay as they are, since scores depend on them whatever the rest."""
 
 
 def _learner_space(algorithm: str, task: str) -> Space:
     settings = settings_for(algorithm, task)
-    start = start_of(algorithm, settings)
-    suggest = _LEARNERS[algorithm]
-    return Space(settings, start, lambda trial: suggest(trial, settings), False, 512)
-
-
-def suggested_ppo(trial: Trial, settings: PPOSettings) -> PPOSettings:
-    """PPO's settings of a trial; steps, walkers and pushes stay as they are, since scores differ by them whatever the rest."""
-    start = start_of("ppo", settings)
-    steps_per_update = _chosen(trial, start, "steps_per_update", (32, 64, 128, 256))
-    minibatches = _chosen(trial, start, "minibatches", (2, 4, 8, 16, 32))
-    samples = settings.walkers * steps_per_update
-    return replace(
-        settings,
-        steps_per_update=steps_per_update,
-        # few walkers make too few samples for so many parts: then every update is one part
-        batch_size=samples // minibatches if samples % minibatches == 0 else samples,
-        epochs=trial.suggest_int("epochs", 1, 12),
-        learning_rate=trial.suggest_float("learning_rate", 2e-4, 1e-2, log=True),
-        time_constant=trial.suggest_float("time_constant", 6.0, 100.0, log=True),
-        gae_lambda=trial.suggest_float("gae_lambda", 0.8, 1.0),
-        clip_range=trial.suggest_float("clip_range", 0.05, 0.4),
-        entropy=trial.suggest_float("entropy", 0.0, 0.02),
-        initial_log_std=trial.suggest_float("initial_log_std", -3.0, 0.0),
-        hidden=_layers(trial, start),
-    )
-
-
-def suggested_sac(trial: Trial, settings: SACSettings) -> SACSettings:
-    """SAC's settings of a trial."""
-    start = start_of("sac", settings)
-    return replace(
-        settings,
-        gradient_steps=trial.suggest_int("gradient_steps", 1, 16, log=True),
-        batch_size=_chosen(trial, start, "batch_size", (128, 256, 512, 1024)),
-        learning_rate=trial.suggest_float("learning_rate", 1e-4, 5e-3, log=True),
-        time_constant=trial.suggest_float("time_constant", 6.0, 100.0, log=True),
-        target_rate=trial.suggest_float("target_rate", 1e-3, 5e-2, log=True),
-        target_entropy=trial.suggest_float("target_entropy", -8.0, 0.0),
-        initial_entropy_weight=trial.suggest_float("initial_entropy_weight", 1e-3, 1.0, log=True),
-        hidden=_layers(trial, start),
-    )
-
-
-_LEARNERS: dict[str, Callable[[Trial, Any], Any]] = {"ppo": suggested_ppo, "sac": suggested_sac}
-
-_SEARCHED = {
-    "ppo": (
-        "steps_per_update", "epochs", "learning_rate", "time_constant", "gae_lambda", "clip_range",
-        "entropy", "initial_log_std",
-    ),
-    "sac": (
-        "gradient_steps", "batch_size", "learning_rate", "time_constant", "target_rate",
-        "target_entropy", "initial_entropy_weight",
-    ),
-}  # fmt: skip
-
-
-def start_of(algorithm: str, settings: Any) -> dict[str, Any]:
-    """The values, by the names of a trial, that stand for a learner's settings."""
-    values = {name: getattr(settings, name) for name in _SEARCHED[algorithm]}
+    # a study's file keeps no tuples, so that layers are words
+    start: Values = {"hidden": "x".join(map(str, settings.hidden))}
     if algorithm == "ppo":
-        values["minibatches"] = settings.walkers * settings.steps_per_update // settings.batch_size
-    return values | {"hidden": "x".join(str(units) for units in settings.hidden)}
+        samples = settings.walkers * settings.steps_per_update
+        start["minibatches"] = samples // settings.batch_size
+    entries = _LEARNERS[algorithm]
+    start |= {path: getattr(settings, path) for path in entries if path not in start}
 
+    def suggest(trial: Trial) -> Any:
+        values = _drawn(trial, entries, start)
+        values["hidden"] = tuple(int(units) for units in values["hidden"].split("x"))
+        if algorithm == "ppo":
+            samples, parts = (
+                settings.walkers * values["steps_per_update"],
+                values.pop("minibatches"),
+            )
+            # few walkers make too few samples for so many parts: then every update is one part
+            values["batch_size"] = samples // parts if samples % parts == 0 else samples
+        return with_values(settings, values)
 
-def _layers(trial: Trial, start: Mapping[str, Any]) -> tuple[int, ...]:
-    # as words, since a study's file keeps no tuples
-    words = _chosen(trial, start, "hidden", _LAYERS)
-    return tuple(int(units) for units in words.split("x"))
-
-
-def _chosen(trial: Trial, start: Mapping[str, Any], name: str, choices: tuple[Any, ...]) -> Any:
-    """One of some choices, or what the settings have now."""
-    own = start[name]
-    return trial.suggest_categorical(name, choices if own in choices else (*choices, own))
+    return Space(settings, start, suggest, False, 512)

@@ -26,7 +26,7 @@ from ..agent import Agent
 from ..evaluation.scoring import run_seeds
 from ..learning.algorithms import train
 from ..registry import env_id_of
-from ..seeds import MOST_EPISODES, TRAINING_SEEDS, TUNING_SEEDS
+from ..seeds import MOST_EPISODES, TRAINING_SEEDS, first_seed
 from ..settings import values_of
 from .spaces import Space, space_of
 
@@ -40,16 +40,18 @@ _WAITING_REPORTS = 5  # of each
 _AS_THEY_ARE = "as_they_are"
 """Marks the trial of the settings that come with the package."""
 _PROCESS = "process"
+_AGAIN = "again"
+"""Marks the trial that tries an unfinished one again, by the number of that one."""
 
 
 @dataclass(frozen=True)
 class Tuning:
-    """What is tuned; a study goes on only with the same, and from the same settings.
+    """What is tuned; a study continues only with the same tuning, from the same settings.
 
     Attributes
     ----------
     agent, task : whose settings
-    episodes : that settings are scored on, of those kept for tuning
+    episodes : number of tuning episodes that settings are scored on
     horizon : of these episodes, for a controller; None for the task's
     steps : of each training, for an agent that is trained; None for its settings' own
     repeats : trainings of a trial, with seeds of their own; its score is their mean
@@ -86,13 +88,6 @@ class Tuning:
             return space
         return replace(space, settings=replace(space.settings, steps=self.steps))
 
-    def record(self) -> dict[str, Any]:
-        """As a study's file keeps it."""
-        return {**asdict(self), "settings": values_of(self.space().settings)}
-
-
-Shown = Callable[[str], object]
-
 
 def tune(
     tuning: Tuning,
@@ -101,20 +96,18 @@ def tune(
     *,
     out: Path | None = None,
     progress: bool = True,
-    shown: Shown = print,
+    shown: Callable[[str], object] = print,
 ) -> optuna.Study:
-    """Try settings until so many trials are done, those of earlier calls with the same file counted.
+    """Try settings until ``trials`` are done, those of earlier calls with the same file counted.
 
-    The first trial is the settings as they are. CMA-ES searches from them where all values are real numbers, tree-structured Parzen
-    estimators elsewhere. A training whose returns lie below the median of other trials' at the same step is given up.
-    Interrupted or killed, a study loses the trial under way only, and if that was the first, it is tried again.
+    The first trial is the present settings. CMA-ES searches from them where all values are real numbers, tree-structured Parzen
+    estimators elsewhere. A training whose returns lie below the median of other trials' at the same step is ended early.
+    An interrupted or killed study loses only the trial under way, and if that was the first, it is tried again.
 
     Parameters
     ----------
-    tuning : Tuning
-    trials : how many in all
-    storage : file of the study, made if it is not there; None to keep it in memory
-    out : JSON file for the best settings so far, written after each trial; see ``best_record``
+    storage : file of the study, made if it does not exist; None to keep it in memory
+    out : JSON file for the best settings so far, written after each trial, as ``shipping.ship`` takes it
     progress : show a bar for each training
     shown : takes a line for each trial
 
@@ -127,20 +120,20 @@ def tune(
     space = tuning.space()
     study = _study(tuning, space, storage)
 
-    def told(study: optuna.Study, trial: FrozenTrial) -> None:
+    def done() -> int:
+        return len(study.get_trials(deepcopy=False, states=_FINISHED))
+
+    def show(study: optuna.Study, trial: FrozenTrial) -> None:
         best = best_trial(study)
         if best is not None and out is not None:
             out.parent.mkdir(parents=True, exist_ok=True)
-            write_json(out, best_record(tuning, best))
-        shown(
-            f"{_done(study)} of {trials}: {result_words(trial)}; {result_words(best)} is the best"
-        )
+            found = {"trial": best.number, "score": best.value, "values": best.user_attrs["values"]}
+            write_json(out, asdict(tuning) | found)
+        shown(f"{done()} of {trials}: {result_words(trial)}; {result_words(best)} is the best")
 
-    if _done(study) < trials:
+    if done() < trials:
         study.optimize(
-            lambda trial: _score(trial, tuning, space, progress),
-            n_trials=trials - _done(study),
-            callbacks=[told],
+            lambda trial: _score(trial, tuning, space, progress), trials - done(), callbacks=[show]
         )
     return study
 
@@ -148,21 +141,8 @@ def tune(
 def best_trial(study: optuna.Study) -> FrozenTrial | None:
     """The trial with the highest score, or None if none is complete."""
     complete = study.get_trials(states=(TrialState.COMPLETE,))
-    return max(
-        (trial for trial in complete if "values" in trial.user_attrs),
-        key=lambda trial: -math.inf if trial.value is None else trial.value,
-        default=None,
-    )
-
-
-def best_record(tuning: Tuning, best: FrozenTrial) -> dict[str, Any]:
-    """The best settings and where they come from, as plain values: what ``shipping.ship_settings`` takes."""
-    return {
-        **asdict(tuning),
-        "trial": best.number,
-        "score": best.value,
-        "values": best.user_attrs["values"],
-    }
+    sound = [trial for trial in complete if "values" in trial.user_attrs]
+    return max(sound, key=lambda trial: trial.values[0], default=None)
 
 
 def result_words(trial: FrozenTrial | None) -> str:
@@ -173,13 +153,9 @@ def result_words(trial: FrozenTrial | None) -> str:
     return f"trial {trial.number} ({score})"
 
 
-def _done(study: optuna.Study) -> int:
-    return len(study.get_trials(deepcopy=False, states=_FINISHED))
-
-
 def _study(tuning: Tuning, space: Space, storage: Path | None) -> optuna.Study:
     """The file's study, a new one where there is none."""
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
     name = f"{tuning.agent} {tuning.task}"
     if storage is not None:
         storage.parent.mkdir(parents=True, exist_ok=True)
@@ -191,14 +167,11 @@ def _study(tuning: Tuning, space: Space, storage: Path | None) -> optuna.Study:
         load_if_exists=True,
         pruner=optuna.pruners.MedianPruner(_WAITING_TRIALS, _WAITING_REPORTS),
     )
-    # seeded by what there is, or a study that is gone on with would draw its first trials again
-    seed = len(study.get_trials(deepcopy=False))
-    study.sampler = (
-        optuna.samplers.CmaEsSampler(seed=seed)
-        if space.is_continuous
-        else optuna.samplers.TPESampler(seed=seed)
-    )
-    record, found = tuning.record(), study.user_attrs.get("tuning")
+    # seeded by the number of trials, or a study that is continued would draw its first trials again
+    sampler = optuna.samplers.CmaEsSampler if space.is_continuous else optuna.samplers.TPESampler
+    study.sampler = sampler(seed=len(study.get_trials(deepcopy=False)))
+    record = {**asdict(tuning), "settings": values_of(space.settings)}
+    found = study.user_attrs.get("tuning")
     if found is None:
         study.set_user_attr("tuning", record)
     elif found != record:
@@ -229,17 +202,25 @@ def _require_study_file(storage: Path, name: str) -> None:
 
 
 def _take_up(study: optuna.Study, space: Space) -> None:
-    """Give up trials whose process was killed, and see that the settings as they are get tried."""
+    """Enqueue the settings as they are in a new study, and again the trials that an interruption or a killed process left unfinished."""
     for trial in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
         host, process = trial.user_attrs.get(_PROCESS, (platform.node(), 0))
         if host == platform.node() and not (process and is_running(process)):
             study.tell(trial.number, state=TrialState.FAIL)
-    kept = study.get_trials(deepcopy=False, states=(*_FINISHED, TrialState.WAITING))
-    if not any(_AS_THEY_ARE in trial.user_attrs for trial in kept):
-        with warnings.catch_warnings():
-            # the settings as they are may lie outside what is searched; Optuna says so and takes these values
-            warnings.simplefilter("ignore", UserWarning)
-            study.enqueue_trial(dict(space.start), user_attrs={_AS_THEY_ARE: True})
+    trials = study.get_trials(deepcopy=False)
+    enqueued = [] if trials else [(dict(space.start), {_AS_THEY_ARE: True})]
+    again = {trial.user_attrs.get(_AGAIN) for trial in trials}
+    for trial in trials:
+        if trial.state is TrialState.FAIL and trial.number not in again:
+            is_first = _AS_THEY_ARE in trial.user_attrs
+            attributes: dict[str, Any] = {_AGAIN: trial.number}
+            attributes |= {_AS_THEY_ARE: True} if is_first else {}
+            enqueued.append((dict(space.start) if is_first else trial.params, attributes))
+    with warnings.catch_warnings():
+        # the settings as they are may lie outside what is searched; Optuna says so and takes these values
+        warnings.simplefilter("ignore", UserWarning)
+        for values, attributes in enqueued:
+            study.enqueue_trial(values, user_attrs=attributes)
 
 
 def _score(trial: optuna.Trial, tuning: Tuning, space: Space, progress: bool) -> float:
@@ -247,15 +228,17 @@ def _score(trial: optuna.Trial, tuning: Tuning, space: Space, progress: bool) ->
     trial.set_user_attr(_PROCESS, [platform.node(), os.getpid()])
     try:
         settings = _settings(trial, space)
-        agents = (
-            [(each, space.make(each, settings)) for each in space.options] if space.make else []
-        )
+        agents = [(each, space.make(each, settings)) for each in space.options if space.make]
     except (LeanYawError, ValueError, np.linalg.LinAlgError):
         if _AS_THEY_ARE in trial.user_attrs:
             raise  # then hardly any trial will succeed
         return -math.inf
-    trial.set_user_attr("values", _kept(tuning, settings))
-    if agents:
+    kept = settings
+    if tuning.steps is not None:  # trainings may be shorter than those that the settings are for
+        own = space_of(tuning.agent, tuning.task).settings.steps
+        kept = replace(settings, steps=own)
+    trial.set_user_attr("values", values_of(kept))
+    if space.make:
         scores = [_mean_return(agent, tuning, options) for options, agent in agents]
     else:
         scores = [
@@ -265,24 +248,18 @@ def _score(trial: optuna.Trial, tuning: Tuning, space: Space, progress: bool) ->
     return float(np.mean(scores))
 
 
-def _kept(tuning: Tuning, settings: Any) -> dict[str, Any]:
-    """What is kept of a trial's settings; trainings may be shorter than those that the settings are for."""
-    if tuning.steps is not None:
-        settings = replace(settings, steps=space_of(tuning.agent, tuning.task).settings.steps)
-    return values_of(settings)
-
-
 def _settings(trial: optuna.Trial, space: Space) -> Any:
     if _AS_THEY_ARE not in trial.user_attrs:
         return space.suggest(trial)
     with contextlib.suppress(ValueError), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        space.suggest(trial)  # notes the values, which need not be exact
+        space.suggest(trial)  # records the values, which need not be exact
     return space.settings
 
 
 def _mean_return(agent: Agent, tuning: Tuning, options: EnvOptions | None = None) -> float:
-    seeds = range(TUNING_SEEDS, TUNING_SEEDS + tuning.episodes)
+    first = first_seed("validation")
+    seeds = range(first, first + tuning.episodes)
     return float(run_seeds(agent, tuning.task, seeds, options=options).metrics["return"].mean())
 
 

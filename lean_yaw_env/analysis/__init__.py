@@ -8,20 +8,27 @@ from lean_yaw_env.analysis.attraction import (
     largest_disturbance,
     largest_pushes,
 )
+from lean_yaw_env.analysis.capturability import (
+    Capture,
+    Choices,
+    capture,
+    capture_map,
+    refine_capture,
+)
 from lean_yaw_env.analysis.closed_loop_map import ClosedLoopMap, ControlInterface
 from lean_yaw_env.analysis.contact import FloorDemand, StepDemand, floor_demand
 from lean_yaw_env.analysis.continuation import Branch, Event, continue_gait
 from lean_yaw_env.analysis.critical_speed import stable_speeds
 from lean_yaw_env.analysis.eigenmodes import Mode, modes
-from lean_yaw_env.analysis.gait_map import stability_map
+from lean_yaw_env.analysis.gait_map import map_cost, stability_map
 from lean_yaw_env.analysis.limit_cycle import (
     LimitCycle,
     find_gait,
     find_limit_cycle,
     find_passive_gaits,
+    find_periodic_gait,
 )
 from lean_yaw_env.analysis.passive_map import PassiveMap
-from lean_yaw_env.analysis.periodic import find_periodic_gait
 from lean_yaw_env.analysis.section_map import BODY_PARAMETERS, SectionMap, section_map_of
 from lean_yaw_env.analysis.storage import load_dataset, save_dataset
 
@@ -30,6 +37,8 @@ __all__ = [
     "COMMAND_PARAMETERS",
     "ActiveMap",
     "Branch",
+    "Capture",
+    "Choices",
     "ClosedLoopMap",
     "ControlInterface",
     "Disturbance",
@@ -42,6 +51,8 @@ __all__ = [
     "SectionMap",
     "StepDemand",
     "basin",
+    "capture",
+    "capture_map",
     "continue_gait",
     "find_gait",
     "find_limit_cycle",
@@ -51,8 +62,10 @@ __all__ = [
     "largest_disturbance",
     "largest_pushes",
     "load_dataset",
+    "map_cost",
     "modes",
     "planar_gait_rate",
+    "refine_capture",
     "save_dataset",
     "section_map_of",
     "stability_map",

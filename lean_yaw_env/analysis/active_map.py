@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lean_yaw_env.analysis.fixed_point import (
-    follow_fixed_point,
-    side_of_folds,
-    solve_fixed_point,
-)
+from lean_yaw_env.analysis.fixed_point import follow_fixed_point, side_of_folds, solve_fixed_point
 from lean_yaw_env.analysis.section_map import (
     BODY_PARAMETERS,
     FEET_IN_TURN,
+    CommandArguments,
     CycleStep,
     Linearised,
     SectionMap,
@@ -28,6 +26,7 @@ from lean_yaw_env.analysis.section_map import (
 from lean_yaw_env.analysis.step_derivatives import BY_BODY, BY_STATE, differentiate_step
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.batch import step_batch
+from lean_yaw_env.kernel.jacobian import INPUTS
 from lean_yaw_env.kernel.records import Command, Outcome
 from lean_yaw_env.parameters import (
     INTER_LEG_ANGLE,
@@ -40,17 +39,17 @@ from lean_yaw_env.parameters import (
     require_inter_leg_angle,
     require_state,
 )
-from lean_yaw_env.validation import require_choice, require_count
-from lean_yaw_env.walker import StepResult, Walker, require_completed
+from lean_yaw_env.validation import require_choice, require_count, require_finite, require_instance
+from lean_yaw_env.walker import Fall, StepResult, Walker, require_completed
 
 if TYPE_CHECKING:
-    from typing_extensions import Self
+    from typing_extensions import Self, Unpack
 
 COMMAND_PARAMETERS = ("inter_leg_angle", "mass_offset", "alternating_offset")
 """Parameters of the active walker only.
 
-``mass_offset`` is the mean of both feet's offsets, ``alternating_offset`` what the left foot's has
-more than that: positive moves the masses away from the stance foot.
+``mass_offset`` is the mean of both feet's offsets, ``alternating_offset`` what the left foot's has more than that: positive moves the
+masses away from the stance foot.
 """
 
 _ARRIVED = 1e-9
@@ -59,6 +58,9 @@ _HELPING_SLOPES = (0.01, 0.02)
 _STATUS = Outcome._fields.index("status")
 _OFFSET = Outcome._fields.index("mass_offset")
 
+Path: TypeAlias = "Callable[[float], ActiveMap]"
+"""Maps from a simpler one at 0 to the wanted one at 1."""
+
 
 @dataclass(frozen=True)
 class ActiveMap(SectionMap):
@@ -66,11 +68,8 @@ class ActiveMap(SectionMap):
 
     Attributes
     ----------
-    walker : Walker
-    inter_leg_angle : float
     mass_offset : (float, float)
-        In force while the left and while the right foot stands; the masses move from the one to
-        the other at the start of each step.
+        In force while the left and while the right foot stands; the masses move from the one to the other at the start of each step.
     n_steps : int
         An odd number needs opposite offsets, which are each other's mirror image.
     """
@@ -84,12 +83,12 @@ class ActiveMap(SectionMap):
     names = tuple(field.name for field in STATE_FIELDS)
     mirror = MIRROR
     zero_explanation = (
-        "section: the swing leg is held at a fixed angle, and two legs at a fixed angle with both "
-        "feet on the floor determine the stance pitch from the ankle angle, so that the state "
-        "after a strike has one freedom less than the section"
+        "section: the swing leg is held at a fixed angle, and two legs at a fixed angle with both feet on the floor determine the stance pitch "
+        "from the ankle angle, so that the state after a strike has one freedom less than the section"
     )
 
     def __post_init__(self) -> None:
+        require_instance("walker", self.walker, Walker)
         require_inter_leg_angle(self.inter_leg_angle)
         require_offsets(self.mass_offset)
         require_count("n_steps", self.n_steps)
@@ -144,17 +143,21 @@ class ActiveMap(SectionMap):
     def step_many(
         self, states: Vector, carried: Vector, foot: int
     ) -> tuple[Vector, Vector, Vector]:
-        n = len(states)
-        commands = np.column_stack(
-            [np.full(n, self.inter_leg_angle), np.full(n, self.mass_offset[foot]), carried]
-        )
-        rows = step_rows(self._bodies, commands, states, foot)
+        command = np.array([[self.inter_leg_angle, self.mass_offset[foot]]])
+        return self.step_commanded(states, carried, command, foot)
+
+    def step_commanded(
+        self, states: Vector, carried: Vector, commands: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
+        whole = np.column_stack([np.broadcast_to(commands, (len(states), 2)), carried])
+        rows = step_rows(self._bodies, whole, states, foot)
         return rows[:, :STATE_SIZE], rows[:, _OFFSET], rows[:, _STATUS]
 
     def search(self) -> Iterator[Vector]:
         yield search_active(self, exact=True)
 
     def value(self, parameter: str) -> float:
+        require_choice("parameter", parameter, self.parameters)
         left, right = self.mass_offset
         commands = {
             "inter_leg_angle": self.inter_leg_angle,
@@ -164,15 +167,14 @@ class ActiveMap(SectionMap):
         return commands[parameter] if parameter in commands else super().value(parameter)
 
     def moved(self, parameter: str, value: float) -> Self:
-        if parameter == "inter_leg_angle":
-            return replace(self, inter_leg_angle=require_inter_leg_angle(value))
-        if parameter in ("mass_offset", "alternating_offset"):
-            offsets = {name: self.value(name) for name in COMMAND_PARAMETERS[1:]}
-            mean, apart = {**offsets, parameter: value}.values()
-            return replace(self, mass_offset=(mean + apart, mean - apart))
-        return super().moved(parameter, value)
+        if not isinstance(parameter, str) or parameter not in COMMAND_PARAMETERS:
+            return super().moved(parameter, value)
+        commands = {name: self.value(name) for name in COMMAND_PARAMETERS}
+        angle, mean, apart = {**commands, parameter: value}.values()
+        return replace(self, inter_leg_angle=angle, mass_offset=(mean + apart, mean - apart))
 
     def along(self, parameter: str) -> Self:
+        require_choice("parameter", parameter, self.parameters)
         # the same offset for both feet, but for none, is no mirror image of itself
         return self.over(2) if parameter == "mass_offset" and self.n_steps == 1 else self
 
@@ -190,17 +192,10 @@ class ActiveMap(SectionMap):
     def _direction(self, parameter: str, k: int) -> Vector:
         """How a parameter enters the inputs of step ``k`` after the state: the command, then the body."""
         require_choice("parameter", parameter, self.parameters)
-        direction = np.zeros(3 + len(BODY_PARAMETERS))
-        if parameter in BODY_PARAMETERS:
-            direction[3 + BODY_PARAMETERS.index(parameter)] = 1.0
-            return direction
         sign = 1.0 if k % 2 == 0 else -1.0
-        direction[:3] = {
-            "inter_leg_angle": (1.0, 0.0, 0.0),
-            "mass_offset": (0.0, 1.0, 1.0),
-            "alternating_offset": (0.0, sign, -sign),
-        }[parameter]
-        return direction
+        shares = {"mass_offset": {"mass_offset": 1.0, "previous_offset": 1.0},
+                  "alternating_offset": {"mass_offset": sign, "previous_offset": -sign}}.get(parameter, {parameter: 1.0})  # fmt: skip
+        return np.array([shares.get(name, 0.0) for name in INPUTS[STATE_SIZE:]])
 
 
 def has_downhill(parameters: WalkerParameters) -> bool:
@@ -212,19 +207,15 @@ def completed_step(
     walker: Walker, state: Vector, foot: Foot, command: Command, k: int
 ) -> StepResult:
     """Step ``k`` of a gait, or ``FellError``."""
-    angle, offset, before = command
-    result = walker.step(
-        state, stance=foot, inter_leg_angle=angle, mass_offset=offset, previous_offset=before
-    )
+    result = walker.step(state, stance=foot, **command._asdict())
     return require_completed(result, f"step {k + 1} of the gait")
 
 
 def step_rows(bodies: Vector, commands: Vector, states: Vector, foot: int) -> Vector:
     """Step many walkers on the left (0) or right (1) foot, unchecked; rows (n, 18) in the order of ``kernel.records.Outcome``."""
-    n = len(states)
-    rows = np.empty((n, len(Outcome._fields)))
-    sides = np.full(n, 1.0 - 2.0 * foot)
-    step_batch(bodies, commands, np.ascontiguousarray(states), sides, rows, 0, n)
+    rows = np.empty((len(states), len(Outcome._fields)))
+    sides = np.full(len(states), 1.0 - 2.0 * foot)
+    step_batch(bodies, commands, np.ascontiguousarray(states), sides, rows, 0, len(states))
     return rows
 
 
@@ -233,38 +224,28 @@ def cycle_step(
 ) -> CycleStep:
     """An active walker's step between two states of its map."""
     return CycleStep(
-        start=start,
-        state=end,
-        foot=foot,
-        command=command,
-        duration=result.duration,
-        displacement=result.displacement,
-        least_normal_force=result.least_normal_force,
-        greatest_friction=result.greatest_friction,
-        gravity_work=result.energy.gravity_work,
-        shift_work=result.energy.shift_work,
-    )
+        start=start, state=end, foot=foot, command=command, duration=result.duration, displacement=result.displacement,
+        least_normal_force=result.least_normal_force, greatest_friction=result.greatest_friction,
+        gravity_work=result.energy.gravity_work, shift_work=result.energy.shift_work,
+    )  # fmt: skip
 
 
-@section_map_of.register
-def _(
-    walker: Walker,
-    *,
-    inter_leg_angle: float = INTER_LEG_ANGLE,
-    mass_offset: float | tuple[float, float] = 0.0,
-) -> ActiveMap:
-    offsets = require_offsets(mass_offset)
-    return ActiveMap(walker, inter_leg_angle, offsets, 1 if offsets[0] == -offsets[1] else 2)
+@section_map_of.register(Walker)
+def _(walker: Walker, **command: Unpack[CommandArguments]) -> ActiveMap:
+    offsets = require_offsets(command.get("mass_offset", 0.0))
+    angle = command.get("inter_leg_angle", INTER_LEG_ANGLE)
+    return ActiveMap(walker, angle, offsets, 1 if offsets[0] == -offsets[1] else 2)
 
 
 def planar_gait_rate(walker: Walker, inter_leg_angle: float, heading: float = 0.0) -> float:
     """Stance pitch rate just after heel strike of the planar active walker, in closed form.
 
-    Without hip width, one step multiplies the squared rate by k^2, k the planar impact's ratio,
-    after gravity has added the slope's work. Returns nan where the slope gives no energy, or no
-    impact takes any.
+    Without hip width, one step multiplies the squared rate by k^2, k the planar impact's ratio, after gravity has added the slope's work.
+    Returns nan where the slope gives no energy, or no impact takes any.
     """
-    parameters = walker.parameters
+    require_finite("heading", heading)
+    require_inter_leg_angle(inter_leg_angle)
+    parameters = require_instance("walker", walker, Walker).parameters
     return planar_rate(parameters.foot_radius, parameters.slope, inter_leg_angle, heading)
 
 
@@ -285,13 +266,8 @@ def planar_rate(foot_radius: float, slope: float, inter_leg_angle: float, headin
 def search_active(section_map: ActiveMap, *, exact: bool) -> Vector:
     """The state of the gait: solved from the planar gait's closed form; failing that, followed from a simpler one.
 
-    Where a fast and a slow gait exist, which meet at a fold, it is the one that the planar gait leads to.
-
-    Parameters
-    ----------
-    section_map : ActiveMap
-    exact : bool
-        See ``solve_fixed_point``; without the Jacobian the two gaits are not told apart.
+    Where a fast and a slow gait exist, which meet at a fold, it is the one that the planar gait leads to. Without the Jacobian (not ``exact``,
+    see ``solve_fixed_point``) the two gaits are not told apart.
 
     Raises
     ------
@@ -299,98 +275,88 @@ def search_active(section_map: ActiveMap, *, exact: bool) -> Vector:
         If no gait was found; says what was tried.
     """
     tried: list[str] = []
-    guess = _planar_guess(section_map)
-    if guess is None:
-        tried.append(
-            "the planar gait has no closed form here: the slope gives no energy along any heading "
-            "that balances the offset"
+    ways: dict[str, Callable[[], Vector]] = {}
+    try:
+        guess = _planar_guess(section_map)
+        path = _raising(section_map, "hip_width", 0.0)
+        planar = _planar_guess(path(0.0))
+        ways["from the planar gait"] = lambda: _solved(section_map, guess, path, planar, exact)
+        ways["following the gait from no hip width and no offset"] = lambda: follow_fixed_point(
+            path, planar, exact=exact
         )
-    else:
-        try:
-            return _from_planar(section_map, guess, exact)
-        except NoGaitError as error:
-            tried.append(f"from the planar gait: {error}")
-        try:
-            return _widened(section_map, exact)
-        except NoGaitError as error:
-            tried.append(f"following the gait from no hip width and no offset: {error}")
+    except NoGaitError as error:
+        tried.append(str(error))
     if section_map.value("alternating_offset") != 0.0:
         for slope in _HELPING_SLOPES:
-            try:
-                return _pumped(section_map, slope, exact)
-            except NoGaitError as error:
-                tried.append(f"following the gait from slope {slope:g} without pumping: {error}")
+            name = f"following the gait from slope {slope:g} without pumping"
+            ways[name] = partial(_pumped, section_map, slope, exact)
+    for name, way in ways.items():
+        try:
+            return way()
+        except NoGaitError as error:
+            tried.append(f"{name}: {error}")
+    left, right = section_map.mass_offset
+    offsets = f"{left:g}" if left == right else f"({left:g}, {right:g})"
     raise NoGaitError(
         f"no gait found for {section_map.walker.parameters} with inter-leg angle "
-        f"{section_map.inter_leg_angle:g} and mass offset {_shown(section_map.mass_offset)}; "
-        "tried: " + "; ".join(tried)
+        f"{section_map.inter_leg_angle:g} and mass offset {offsets}; tried: {'; '.join(tried)}. "
+        f"{_advice(section_map, tried)}"
     )
 
 
-def _shown(offsets: tuple[float, float]) -> str:
-    left, right = offsets
-    return f"{left:g}" if left == right else f"({left:g}, {right:g})"
+def _advice(section_map: ActiveMap, tried: list[str]) -> str:
+    """What to change where no gait was found."""
+    if any(Fall.LIFT_OFF.value in each for each in tried):
+        return "Try a gentler slope, smaller feet or a smaller inter-leg angle: so fast, the foot lifts off"
+    slope, offset = section_map.value("slope"), section_map.value("mass_offset")
+    if slope <= 0.0 and section_map.value("alternating_offset") == 0.0:
+        return "Try a positive slope, or pump: an alternating offset near 0.03 drives the walker"
+    most = math.tan(slope)
+    if abs(offset) >= most > 0.0 and not section_map.walker.parameters.slope_turns:
+        return f"Try a mass offset well within ±{most:.3g}, the most that this slope can balance, or a steeper slope"
+    return "Try a steeper slope, a smaller inter-leg angle or mass offset, narrower hips, or an ankle tilt near 0.5"
 
 
-def _planar_guess(section_map: ActiveMap) -> Vector | None:
+def _planar_guess(section_map: ActiveMap) -> Vector:
     heading, offset = 0.0, section_map.value("mass_offset")
     parameters = section_map.walker.parameters
     if offset != 0.0 and not parameters.slope_turns:
         sine = -offset / math.tan(parameters.slope or math.inf)
-        if not abs(sine) < 1.0:
-            return None
-        heading = math.asin(sine)
-    rate = planar_gait_rate(section_map.walker, section_map.inter_leg_angle, heading)
+        heading = math.asin(sine) if abs(sine) < 1.0 else math.nan
+    rate = planar_rate(
+        parameters.foot_radius, parameters.slope, section_map.inter_leg_angle, heading
+    )
     if math.isnan(rate):
-        return None
+        raise NoGaitError(
+            "the planar gait has no closed form here: the slope gives no energy along any heading "
+            "that balances the offset"
+        )
     return np.array([heading, 0.5 * section_map.inter_leg_angle, 0.0, rate, 0.0])
 
 
-def _from_planar(section_map: ActiveMap, guess: Vector, exact: bool) -> Vector:
+def _solved(
+    section_map: ActiveMap, guess: Vector, path: Path, planar: Vector, exact: bool
+) -> Vector:
     """Solve at once; a gait past a fold only counts where none on the planar gait's side can be followed."""
     state = solve_fixed_point(section_map, guess, exact=exact)
-    if not exact:
-        return state
-    path, planar = _widening(section_map)
-    side = side_of_folds(path(0.0), planar)
-    if side_of_folds(section_map, state) == side:
-        return state
-    try:
-        return follow_fixed_point(path, planar, side=side)[1]
-    except NoGaitError:
-        return state
-
-
-def _widened(section_map: ActiveMap, exact: bool) -> Vector:
-    path, planar = _widening(section_map)
-    return follow_fixed_point(path, planar, exact=exact)[1]
-
-
-def _widening(section_map: ActiveMap) -> tuple[Callable[[float], ActiveMap], Vector]:
-    """The path on which hip width and offsets grow together from zero, and the planar gait there."""
-    width = section_map.value("hip_width")
-
-    def path(share: float) -> ActiveMap:
-        return _with_offsets(section_map.moved("hip_width", share * width), share)
-
-    planar = _planar_guess(path(0.0))
-    if planar is None:
-        raise NoGaitError("the slope gives no energy")
-    return path, planar
+    if exact and side_of_folds(section_map, state) != (side := side_of_folds(path(0.0), planar)):
+        with suppress(NoGaitError):
+            return follow_fixed_point(path, planar, side=side)
+    return state
 
 
 def _pumped(section_map: ActiveMap, slope: float, exact: bool) -> Vector:
-    """From a slope that drives the gait alone: raise the offsets from zero as the slope becomes the map's own."""
-    target = section_map.value("slope")
+    """Followed from a slope that drives the gait without pumping."""
+    path = _raising(section_map, "slope", slope)
+    return follow_fixed_point(path, search_active(path(0.0), exact=exact), exact=exact)
+
+
+def _raising(section_map: ActiveMap, parameter: str, start: float) -> Path:
+    """The path on which the offsets grow from zero as a parameter goes from a start to the map's own value."""
+    target, (left, right) = section_map.value(parameter), section_map.mass_offset
 
     def path(share: float) -> ActiveMap:
-        return _with_offsets(section_map.moved("slope", slope + share * (target - slope)), share)
+        moved = section_map.moved(parameter, start + share * (target - start))
+        return replace(moved, mass_offset=(share * left, share * right))
 
-    start = search_active(path(0.0), exact=exact)
-    return follow_fixed_point(path, start, exact=exact)[1]
-
-
-def _with_offsets(section_map: ActiveMap, share: float) -> ActiveMap:
-    """The map at a share of its offsets."""
-    left, right = section_map.mass_offset
-    return replace(section_map, mass_offset=(share * left, share * right))
+    return path

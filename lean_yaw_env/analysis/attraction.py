@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,16 +13,27 @@ from numpy.typing import NDArray
 
 from lean_yaw_env.analysis.limit_cycle import LimitCycle, find_limit_cycle
 from lean_yaw_env.analysis.many_walks import ENDINGS, SURVIVED, walk_many
-from lean_yaw_env.analysis.progress import Counter
-from lean_yaw_env.analysis.section_map import SectionMap, section_map_of
-from lean_yaw_env.analysis.storage import Progressing, labelled, require_axis
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, QUARTER_TURN, Vector
-from lean_yaw_env.passive import PassiveWalker
-from lean_yaw_env.validation import require_choice, require_count, require_number
-from lean_yaw_env.walker import Walker
+from lean_yaw_env.analysis.section_map import (
+    CommandArguments,
+    SectionMap,
+    WalkerOrMap,
+    section_map_of,
+)
+from lean_yaw_env.analysis.storage import Growing, require_axis
+from lean_yaw_env.parameters import QUARTER_TURN, Vector
+from lean_yaw_env.validation import (
+    require_array,
+    require_choice,
+    require_count,
+    require_flag,
+    require_instance,
+    require_number,
+    require_pair,
+)
 
 if TYPE_CHECKING:
     import xarray
+    from typing_extensions import Unpack
 
 PUSHED = ("stance_pitch_rate", "ankle_rate")
 """Rates that a push changes, the first along the direction zero."""
@@ -35,16 +46,15 @@ _BOUNDED = ("stance_pitch", "ankle_angle")
 
 
 def basin(
-    walker: Walker | PassiveWalker | SectionMap,
+    walker: WalkerOrMap,
     x: tuple[str, Sequence[float] | Vector],
     y: tuple[str, Sequence[float] | Vector],
     *,
     centre: Vector | None = None,
     n_steps: int = 60,
-    inter_leg_angle: float = INTER_LEG_ANGLE,
-    mass_offset: float | tuple[float, float] = 0.0,
     path: str | Path | None = None,
     progress: bool = False,
+    **command: Unpack[CommandArguments],
 ) -> xarray.Dataset:
     """Walk from every point of a plane of the section.
 
@@ -56,19 +66,18 @@ def basin(
     centre : shape (k,), optional
         A state in the plane; by default the gait's. With it no gait is looked for.
     n_steps : int >= 1
-        A walk of so many steps counts as survived. A fall comes within some ten of them; how long
-        the way back takes is in the multipliers.
-    inter_leg_angle, mass_offset : see ``find_limit_cycle``
+        A walk of so many steps counts as survived. A fall comes within some ten of them; how long the way back takes is in the multipliers.
     path : file name, optional
         Where to keep what is done, whole or not at all; an interrupted basin goes on from there.
     progress : bool
+    inter_leg_angle, mass_offset : see ``find_limit_cycle``
 
     Returns
     -------
     xarray.Dataset
-        Over x and y: ``steps`` completed, ``ending`` (0 survived, otherwise how it fell, see the
-        variable's ``meanings``), and without a ``centre`` the ``distance`` of the last state from the gait (largest
-        coordinate of the free ones, on the foot that stands). Attribute ``centre``: the state by coordinate, as JSON.
+        Over x and y: ``steps`` completed, ``ending`` (0 survived, otherwise how it fell, see the variable's ``meanings``), and without a
+        ``centre`` the ``distance`` of the last state from the gait (largest coordinate of the free ones, on the foot that stands).
+        Attribute ``centre``: the state by coordinate, as JSON.
 
     Raises
     ------
@@ -78,39 +87,59 @@ def basin(
         If there is no gait.
     """
     require_count("n_steps", n_steps, 1, 1_000_000)
-    section_map = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
+    require_flag("progress", progress)
+    section_map = section_map_of(walker, **command)
+    if centre is not None:
+        section_map.require_state(require_array("centre", centre, (len(section_map.names),)))
     cycle = find_limit_cycle(section_map) if centre is None else None
     middle = cycle.state if cycle is not None else section_map.require_state(np.asarray(centre))
-    axes = {name: _axis(section_map, name, values) for name, values in (x, y)}
-    if len(axes) != 2:
+    x, y = (require_pair(*axis, "coordinate, values") for axis in (("x", x), ("y", y)))
+    if x[0] == y[0]:
         raise ValueError(f"x and y must be different coordinates, got {x[0]!r} twice")
-    grid = np.meshgrid(*axes.values(), indexing="ij")
-    n = grid[0].size
-    states = np.tile(middle, (n, 1))
-    for name, values in zip(axes, grid, strict=True):
-        states[:, section_map.names.index(name)] = values.ravel()
-    result: dict[str, Vector] = {"steps": np.zeros(n), "ending": np.full(n, -1.0)}
+    axes, states = section_grid(section_map, dict((x, y)), middle)
+    result: dict[str, Vector] = {
+        "steps": np.zeros(len(states)),
+        "ending": np.full(len(states), -1.0),
+    }
     if cycle is not None:
-        result["distance"] = np.full(n, np.nan)
-
-    def dataset() -> xarray.Dataset:
-        return _dataset(section_map, axes, result, middle, n_steps)
-
-    saved = Progressing(path, dataset)
-    saved.resume(result)
-    with saved, Counter("basin", progress, n) as counter:
-        waiting = np.flatnonzero(result["ending"] < 0.0)
-        counter.advance(n - waiting.size)
-        for first in range(0, waiting.size, _CHUNK):
-            some = waiting[first : first + _CHUNK]
+        result["distance"] = np.full(len(states), np.nan)
+    question = {**section_map.question(), "n_steps": n_steps}
+    named = dict(zip(section_map.names, middle.round(12).tolist(), strict=True))
+    meanings = json.dumps({str(int(key)): text for key, text in ENDINGS.items()})
+    growing = Growing(
+        "basin", axes, result, question, path, progress,
+        attrs={"centre": json.dumps(named)}, notes={"ending": {"meanings": meanings}},
+    )  # fmt: skip
+    with growing:
+        for some in growing.chunks(result["ending"] < 0.0, _CHUNK):
             walks = walk_many(section_map, states[some], n_steps)
-            result["steps"][some] = walks.steps
-            result["ending"][some] = walks.endings
+            result["steps"][some], result["ending"][some] = walks.steps, walks.endings
             if cycle is not None:
-                result["distance"][some] = _distance(cycle, walks.states, walks.steps)
-            counter.advance(some.size)
-            saved.save_if_due()
-    return dataset()
+                on_foot = np.array([cycle.state, cycle.steps[0].state])[walks.steps % 2]
+                apart = np.abs(walks.states - on_foot)[:, section_map.free]
+                result["distance"][some] = apart.max(axis=1)
+    return growing.dataset()
+
+
+def section_grid(
+    section_map: SectionMap, axes: Mapping[str, Sequence[float] | Vector], centre: Vector
+) -> tuple[dict[str, Vector], Vector]:
+    """The axes of a slice or box of the section, and the states (n, k) at its points, the other coordinates those of ``centre`` (k,).
+
+    Raises
+    ------
+    ValueError
+        If a name is no coordinate, or its values do not grow or leave its range.
+    """
+    checked: dict[str, Vector] = {}
+    for name, values in axes.items():
+        _index(section_map, name)
+        bound = QUARTER_TURN if name in _BOUNDED else 1e6
+        checked[name] = require_axis(f"values of {name}", values, -bound, bound)
+    columns = [grid.ravel() for grid in np.meshgrid(*checked.values(), indexing="ij")]
+    states = np.tile(centre, (columns[0].size, 1))
+    states[:, [section_map.names.index(name) for name in checked]] = np.column_stack(columns)
+    return checked, states
 
 
 @dataclass(frozen=True)
@@ -141,7 +170,7 @@ class Disturbance:
 
 
 def largest_disturbance(
-    walker: Walker | PassiveWalker | SectionMap,
+    walker: WalkerOrMap,
     coordinate: str,
     *,
     upward: bool = True,
@@ -149,8 +178,7 @@ def largest_disturbance(
     most: float = 5.0,
     tolerance: float = 1e-4,
     n_steps: int = 60,
-    inter_leg_angle: float = INTER_LEG_ANGLE,
-    mass_offset: float | tuple[float, float] = 0.0,
+    **command: Unpack[CommandArguments],
 ) -> Disturbance:
     """Search for the largest disturbance of one coordinate that the gait survives.
 
@@ -179,9 +207,11 @@ def largest_disturbance(
     SolverError
         If the integrator fails.
     """
+    require_flag("upward", upward)
+    require_flag("relative", relative)
     require_number("most", most, 0.0, 1e6, "(]")
     require_number("tolerance", tolerance, 0.0, most, "(]")
-    section_map = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
+    section_map = section_map_of(walker, **command)
     index = _index(section_map, coordinate)
     cycle = find_limit_cycle(section_map)
     value = float(cycle.state[index])
@@ -192,11 +222,8 @@ def largest_disturbance(
     if coordinate in _BOUNDED:
         room = QUARTER_TURN - (value if unit > 0.0 else -value)
         reach = min(most, 0.999 * room / abs(unit))
-    ways = np.zeros((1, len(cycle.state)))
-    ways[0, index] = unit
-    sizes, endings = _largest_survived(
-        section_map, cycle.state, ways, reach, tolerance, _DISTURBANCES, n_steps
-    )
+    way = unit * np.eye(len(cycle.state))[[index]]
+    sizes, endings = _largest_survived(cycle, way, reach, tolerance, _DISTURBANCES, n_steps)
     largest, ending = float(sizes[0]) * unit, float(endings[0])
     return Disturbance(
         coordinate=coordinate,
@@ -252,14 +279,13 @@ def largest_pushes(
     SolverError
         If the integrator fails.
     """
+    require_instance("cycle", cycle, LimitCycle)
     require_count("directions", directions, 1, 3600)
     require_number("most", most, 0.0, 100.0, "(]")
     angles = 2.0 * np.pi * np.arange(directions) / directions
     ways = push_ways(cycle.section_map, angles)
     tolerance = most / _PUSHES**2
-    sizes, endings = _largest_survived(
-        cycle.section_map, cycle.state, ways, most, tolerance, _PUSHES, n_steps
-    )
+    sizes, endings = _largest_survived(cycle, ways, most, tolerance, _PUSHES, n_steps)
     return LargestPushes(angles, sizes, endings != SURVIVED, tolerance)
 
 
@@ -272,15 +298,9 @@ def push_ways(section_map: SectionMap, angles: Vector) -> Vector:
 
 
 def _largest_survived(
-    section_map: SectionMap,
-    state: Vector,
-    ways: Vector,
-    most: float,
-    tolerance: float,
-    sections: int,
-    n_steps: int,
+    cycle: LimitCycle, ways: Vector, most: float, tolerance: float, sections: int, n_steps: int
 ) -> tuple[Vector, Vector]:
-    """How far a state may be moved along each of the ways (n, k), and how the walk from a little farther ends (0 where nothing falls).
+    """How far a gait's state may be moved along each of the ways (n, k), and how the walk from a little farther ends (0 where nothing falls).
 
     A scan finds the first of some sizes at which the walker falls; further ones narrow that bracket until it is as small as the tolerance.
     """
@@ -290,8 +310,9 @@ def _largest_survived(
     is_first = True
     while going.size and (is_first or width > tolerance):
         sizes = low[going, None] + width * np.arange(1, sections + 1) / sections
-        states = state + sizes[:, :, None] * ways[going, None, :]
-        walks = walk_many(section_map, states.reshape(-1, state.size), n_steps).require_solved()
+        states = cycle.state + sizes[:, :, None] * ways[going, None, :]
+        starts = states.reshape(-1, cycle.state.size)
+        walks = walk_many(cycle.section_map, starts, n_steps).require_solved()
         ended = walks.endings.reshape(going.size, sections)
         falls = ended != SURVIVED
         falls[:, -1] |= not is_first  # the bracket's end, but for rounding
@@ -309,39 +330,3 @@ def _largest_survived(
 def _index(section_map: SectionMap, coordinate: str) -> int:
     require_choice("coordinate", coordinate, [section_map.names[i] for i in section_map.free])
     return section_map.names.index(coordinate)
-
-
-def _axis(section_map: SectionMap, name: str, values: Sequence[float] | Vector) -> Vector:
-    _index(section_map, name)
-    bound = QUARTER_TURN if name in _BOUNDED else 1e6
-    return require_axis(f"values of {name}", values, -bound, bound)
-
-
-def _distance(cycle: LimitCycle, states: Vector, steps: NDArray[np.int64]) -> Vector:
-    """From the gait on the foot that stands, in the free coordinates."""
-    on_foot = np.array([cycle.state, cycle.steps[0].state])
-    return np.abs(states - on_foot[steps % 2])[:, cycle.section_map.free].max(axis=1)
-
-
-def _dataset(
-    section_map: SectionMap,
-    axes: dict[str, Vector],
-    result: dict[str, Vector],
-    centre: Vector,
-    n_steps: int,
-) -> xarray.Dataset:
-    shape = tuple(axis.size for axis in axes.values())
-    meanings = {"meanings": json.dumps({str(int(k)): text for k, text in ENDINGS.items()})}
-    return labelled().Dataset(
-        {
-            name: (list(axes), values.reshape(shape), meanings if name == "ending" else {})
-            for name, values in result.items()
-        },
-        coords=axes,
-        attrs={
-            "question": json.dumps({**section_map.question(), "n_steps": n_steps}, sort_keys=True),
-            "centre": json.dumps(
-                dict(zip(section_map.names, centre.round(12).tolist(), strict=True))
-            ),
-        },
-    )

@@ -11,17 +11,12 @@ import hashlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lean_yaw_env.analysis.active_map import (
-    completed_step,
-    cycle_step,
-    has_downhill,
-    step_rows,
-)
+from lean_yaw_env.analysis.active_map import completed_step, cycle_step, has_downhill, step_rows
 from lean_yaw_env.analysis.fixed_point import solve_fixed_point
 from lean_yaw_env.analysis.many_walks import walk_many
 from lean_yaw_env.analysis.section_map import (
@@ -33,7 +28,6 @@ from lean_yaw_env.analysis.section_map import (
     Motion,
     SectionMap,
 )
-from lean_yaw_env.analysis.slopes import Slopes, slopes_of
 from lean_yaw_env.analysis.step_derivatives import BY_BODY, BY_COMMAND, differentiate_step
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.jacobian import OUTPUTS
@@ -48,6 +42,10 @@ SETTLING_STEPS = 400
 """Walked from the start before Newton's method takes over; even, to end on the left foot."""
 
 _TINY = 1e-30
+_COARSEST, _SIZES = 0.25, 14
+"""The largest step of differences, in units of the scales, and how many there are, each half the one before."""
+_ROUNDING = 2.0**-24
+"""Of a number between a half and one in single precision."""
 _STATUS = Outcome._fields.index("status")
 _OFFSET_OUT = Outcome._fields.index("mass_offset")
 
@@ -93,18 +91,44 @@ class ControlInterface(Protocol):
         ...
 
 
+class Slopes(NamedTuple):
+    """A function's ``values`` (m,) at a place, its ``slopes`` (m, k), and bounds of their ``errors`` (m, k)."""
+
+    values: Vector
+    slopes: Vector
+    errors: Vector
+
+
+def slopes_of(
+    function: Callable[[Vector], Vector], place: Vector, scales: Vector, reach: Vector
+) -> Slopes:
+    """Derivatives of a function that computes in single precision, from places (n, k) to values (n, m), by central differences.
+
+    Each derivative is extrapolated from two step sizes, at the size where those beside it agree best: larger ones see the function's curve
+    and its limits, smaller ones its rounding, which is relative to ``reach`` (m,). How far they agree, and the rounding, is the error. A change
+    by ``scales`` (k,) is one that the function sees as about one.
+    """
+    size = len(place)
+    steps = _COARSEST * 0.5 ** np.arange(_SIZES)[:, None] * scales
+    offsets = steps[:, :, None] * np.eye(size)  # (sizes, k, k)
+    both = np.concatenate([offsets, -offsets]).reshape(-1, size)
+    found = function(np.vstack([place, place + both]))
+    sides = found[1:].reshape(2, _SIZES, size, len(reach))
+    central = (sides[0] - sides[1]) / (2.0 * steps[:, :, None])
+    better = (4.0 * central[1:] - central[:-1]) / 3.0
+    apart = np.abs(np.diff(better, axis=0))
+    spread = np.maximum(apart[:-1], apart[1:]) + _ROUNDING * reach / steps[2:-1, :, None]
+    best = spread.argmin(axis=0)[None]
+    slopes = np.take_along_axis(better[1:-1], best, axis=0)[0]
+    errors = np.take_along_axis(spread, best, axis=0)[0]
+    return Slopes(found[0], slopes.T, errors.T)
+
+
 @dataclass(frozen=True)
 class ClosedLoopMap(SectionMap):
-    """Steps of a walker that a controller steers.
+    """Steps of a walker that a controller steers: ``predict`` maps observations (n, m) to actions (n, 2).
 
-    Attributes
-    ----------
-    walker : Walker
-    interface : ControlInterface
-    predict : from observations (n, m) to actions (n, 2)
-    start : shape (k,)
-        A state on the left foot to walk from, where the gait is looked for.
-    n_steps : even int
+    ``start`` (k,) is a state on the left foot to walk from, where the gait is looked for. ``n_steps`` is even.
     """
 
     walker: Walker
@@ -127,9 +151,7 @@ class ClosedLoopMap(SectionMap):
 
     @property
     def names(self) -> tuple[str, ...]:
-        return (
-            *(each.name for each in STATE_FIELDS), "mass_offset", *self.interface.remembered
-        )  # fmt: skip
+        return (*(each.name for each in STATE_FIELDS), "mass_offset", *self.interface.remembered)
 
     @property
     def motions(self) -> tuple[Motion, ...]:
@@ -156,10 +178,8 @@ class ClosedLoopMap(SectionMap):
             foot = FEET_IN_TURN[k % 2]
             command = self._command(state, self.commands(state[None], foot)[0])
             result = completed_step(self.walker, state[:STATE_SIZE], foot, command, k)
-            values = (
-                *result.state, result.duration, *result.displacement, result.mass_offset, result.energy.shift_work
-            )  # fmt: skip
-            outputs = {name: np.array([v]) for name, v in zip(OUTPUTS, values, strict=True)}
+            values = [*result.state, result.duration, *result.displacement, result.mass_offset, result.energy.shift_work]  # fmt: skip
+            outputs = dict(zip(OUTPUTS, np.array(values)[:, None], strict=True))
             left = self.interface.remember(state[None], outputs)[0]
             after = np.concatenate([result.state, [result.mass_offset], left])
             steps.append(cycle_step(state, after, foot, command, result))
@@ -192,14 +212,13 @@ class ClosedLoopMap(SectionMap):
         inputs = BY_COMMAND if parameter is None else BY_BODY
         step = differentiate_step(self.walker, state[:STATE_SIZE], foot, command, inputs=inputs)
         # by the state, the two commands and the parameter
-        size = len(state)
-        wide = np.zeros((len(OUTPUTS), size + 3))
+        size, wide = len(state), np.zeros((len(OUTPUTS), len(state) + 3))
         wide[:, :STATE_SIZE] = step.jacobian[:, :STATE_SIZE]
         wide[:, OFFSET] = step.jacobian[:, STATE_SIZE + 2]
         wide[:, size : size + 2] = step.jacobian[:, STATE_SIZE : STATE_SIZE + 2]
         if parameter is not None:
-            index = BODY_PARAMETERS.index(require_choice("parameter", parameter, self.parameters))
-            wide[:, size + 2] = step.jacobian[:, BY_COMMAND + index]
+            require_choice("parameter", parameter, self.parameters)
+            wide[:, size + 2] = step.jacobian[:, BY_COMMAND + BODY_PARAMETERS.index(parameter)]
         image, found = self._after(state, step.outputs, wide)
         by_command = found[:, size : size + 2]
         return Linearised(
@@ -225,10 +244,13 @@ class ClosedLoopMap(SectionMap):
     def step_many(
         self, states: Vector, carried: Vector, foot: int
     ) -> tuple[Vector, Vector, Vector]:
-        asked = self.commands(states, FEET_IN_TURN[foot])
-        rows = step_rows(
-            self._bodies, np.column_stack([asked, states[:, OFFSET]]), states[:, :STATE_SIZE], foot
-        )
+        return self.step_commanded(states, carried, self.commands(states, FEET_IN_TURN[foot]), foot)
+
+    def step_commanded(
+        self, states: Vector, carried: Vector, commands: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
+        whole = np.column_stack([commands, states[:, OFFSET]])
+        rows = step_rows(self._bodies, whole, states[:, :STATE_SIZE], foot)
         after = states.copy()
         after[:, :STATE_SIZE], after[:, OFFSET] = rows[:, :STATE_SIZE], rows[:, _OFFSET_OUT]
         done = rows[:, _STATUS] == STEPPED
@@ -254,8 +276,7 @@ class ClosedLoopMap(SectionMap):
             yield found
             return
         raise NoGaitError(
-            f"no gait of walker and controller repeats every {self.n_steps} steps; tried: "
-            + "; ".join(tried)
+            f"no gait of walker and controller repeats every {self.n_steps} steps; tried: {'; '.join(tried)}"
         )
 
     def question(self) -> dict[str, Any]:

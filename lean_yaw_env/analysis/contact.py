@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from lean_yaw_env.analysis.limit_cycle import find_limit_cycle
-from lean_yaw_env.analysis.section_map import SectionMap
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, STATE_SIZE, Foot, Vector
-from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.analysis.section_map import CommandArguments, WalkerOrMap
+from lean_yaw_env.parameters import STATE_SIZE, Foot, Vector
 from lean_yaw_env.validation import require_count
-from lean_yaw_env.walker import Walker
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 @dataclass(frozen=True)
 class StepDemand:
-    """Within one step of the gait, at uniform times; shapes (n,).
+    """Within one step of the gait, at uniform times from its start; shapes (n,).
 
-    Attributes
-    ----------
-    stance : "left" or "right"
-    time : from the start of the step
-    normal_force : in weights
-    friction_demand : tangential over normal force
-    yaw_torque : about the floor's normal through the contact, in weight times leg length
+    Normal force in weights, friction demand as tangential over normal force, and the yaw torque about the floor's normal through the contact
+    in weight times leg length.
     """
 
     stance: Foot
@@ -36,15 +33,7 @@ class StepDemand:
 
 @dataclass(frozen=True)
 class FloorDemand:
-    """Over the steps of a cycle, two of them but for a gait that repeats after more.
-
-    Attributes
-    ----------
-    steps : tuple of StepDemand
-        On the left and on the right foot by turns.
-    least_normal_force, greatest_normal_force, greatest_friction, greatest_yaw_torque : float
-        The last by magnitude.
-    """
+    """Over the steps of a cycle, on the left and on the right foot by turns, and the extremes; the greatest torque is that by magnitude."""
 
     steps: tuple[StepDemand, ...]
     least_normal_force: float
@@ -54,11 +43,7 @@ class FloorDemand:
 
 
 def floor_demand(
-    walker: Walker | PassiveWalker | SectionMap,
-    *,
-    inter_leg_angle: float = INTER_LEG_ANGLE,
-    mass_offset: float | tuple[float, float] = 0.0,
-    samples: int = 200,
+    walker: WalkerOrMap, *, samples: int = 200, **command: Unpack[CommandArguments]
 ) -> FloorDemand:
     """Force and torque between floor and stance foot over a walker's gait.
 
@@ -68,9 +53,9 @@ def floor_demand(
     ----------
     walker : Walker, PassiveWalker or SectionMap
         A passive walker's swing leg is massless and asks nothing of the floor.
-    inter_leg_angle, mass_offset : see ``find_limit_cycle``
     samples : int >= 2
         Per step.
+    inter_leg_angle, mass_offset : see ``find_limit_cycle``
 
     Raises
     ------
@@ -80,24 +65,18 @@ def floor_demand(
         If an argument is outside its range.
     """
     require_count("samples", samples, 2, 1_000_000)
-    cycle = find_limit_cycle(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
-    stander = cycle.section_map.stander
+    cycle = find_limit_cycle(walker, **command)
     demands = []
     for step in cycle.steps:
-        angle, offset, before = step.command
-        motion = stander.stance_motion(
+        motion = cycle.section_map.stander.stance_motion(
             step.start[:STATE_SIZE],
             duration=step.duration,
             samples=samples,
             stance=step.foot,
-            inter_leg_angle=angle,
-            mass_offset=offset,
-            previous_offset=before,
+            **step.command._asdict(),
         )
-        named = {
-            name: motion[name] for name in ("time", "normal_force", "friction_demand", "yaw_torque")
-        }
-        demands.append(StepDemand(stance=step.foot, **named))
+        columns = ("time", "normal_force", "friction_demand", "yaw_torque")
+        demands.append(StepDemand(step.foot, *(motion[name] for name in columns)))
     normal = np.concatenate([demand.normal_force for demand in demands])
     return FloorDemand(
         steps=tuple(demands),

@@ -1,19 +1,19 @@
 """Following a gait along a parameter, round folds, by pseudo-arclength continuation.
 
-Each step along the branch is predicted along its tangent and corrected by Newton's method on the
-section map with all its derivatives exact, the parameter's among them. Where a multiplier leaves or
-enters the unit circle is located by a root finder along the branch.
+Each step along the branch is predicted along its tangent and corrected by Newton's method on the section map with all its derivatives exact,
+the parameter's among them. Where a multiplier leaves or enters the unit circle is located by a root finder along the branch.
 
-A symmetric gait is followed as fixed point of one mirrored step, and its multipliers are of that; a
-stride's are their squares. A multiplier of -1 of the mirrored step, +1 of the stride, is where a
-gait begins that repeats after two steps: one that limps, or, in a three-dimensional mode, turns.
+A symmetric gait is followed as fixed point of one mirrored step, and its multipliers are of that; a stride's are their squares. A multiplier
+of -1 of the mirrored step, +1 of the stride, is where a gait begins that repeats after two steps: one that limps, or, in a
+three-dimensional mode, turns.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +27,25 @@ from lean_yaw_env.analysis.limit_cycle import (
     sorted_eigenvalues,
     spectral_radii,
 )
-from lean_yaw_env.analysis.progress import Counter
-from lean_yaw_env.analysis.section_map import SectionMap, section_map_of
+from lean_yaw_env.analysis.section_map import (
+    CommandArguments,
+    SectionMap,
+    WalkerOrMap,
+    section_map_of,
+)
+from lean_yaw_env.analysis.storage import progress_bar
 from lean_yaw_env.errors import LeanYawError, NoGaitError
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector
-from lean_yaw_env.passive import PassiveWalker
-from lean_yaw_env.validation import require_count, require_number
-from lean_yaw_env.walker import Walker
+from lean_yaw_env.parameters import Vector
+from lean_yaw_env.validation import (
+    require_count,
+    require_finite,
+    require_flag,
+    require_number,
+    require_pair,
+)
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 EventKind = Literal["fold", "real +1", "real -1", "complex pair"]
 
@@ -109,23 +121,23 @@ class Branch:
 
     def cycle(self, index: int) -> LimitCycle:
         """The gait at a point of the branch."""
+        require_count("index", index, -len(self.values), len(self.values) - 1)
         moved = self.section_map.moved(self.parameter, float(self.values[index]))
         return cycle_at(moved, self.states[index])
 
 
 def continue_gait(
-    walker: Walker | PassiveWalker | SectionMap,
+    walker: WalkerOrMap,
     parameter: str,
     limits: tuple[float, float],
     *,
     state: Vector | None = None,
     n_steps: int | None = None,
-    inter_leg_angle: float = INTER_LEG_ANGLE,
-    mass_offset: float | tuple[float, float] = 0.0,
     upward: bool = True,
     longest_step: float = 0.05,
     most_points: int = 1000,
     progress: bool = False,
+    **command: Unpack[CommandArguments],
 ) -> Branch:
     """Follow a gait along a parameter until it leaves an interval, ends, or enough points are known.
 
@@ -141,7 +153,6 @@ def continue_gait(
         A gait's section state to start from; by default ``find_limit_cycle``'s.
     n_steps : int, optional
         Steps until ``state`` recurs; by default the fewest for a simple gait.
-    inter_leg_angle, mass_offset : see ``find_limit_cycle``
     upward : bool
         Whether the parameter grows at first.
     longest_step : (0, 1]
@@ -149,6 +160,7 @@ def continue_gait(
     most_points : int >= 2
     progress : bool
         Show a counter of points.
+    inter_leg_angle, mass_offset : see ``find_limit_cycle``
 
     Raises
     ------
@@ -157,34 +169,41 @@ def continue_gait(
     ValueError
         If an argument is outside its range.
     """
-    simple = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
+    simple = section_map_of(walker, **command)
     section_map = simple.along(parameter) if n_steps is None else simple.over(n_steps)
-    low, high = _require_limits(limits, parameter, section_map.value(parameter))
+    value = section_map.value(parameter)
+    low, high = (
+        require_finite("limits", limit) for limit in require_pair("limits", limits, "low, high")
+    )
+    if not low < high:
+        raise ValueError(f"limits must be (low, high) with low < high, got {limits!r}")
+    if not low <= value <= high:
+        raise ValueError(f"limits must hold the start's {parameter}, {value:g}, got {limits!r}")
+    require_flag("upward", upward)
+    require_flag("progress", progress)
     require_number("longest_step", longest_step, 0.0, 1.0, "(]")
     require_count("most_points", most_points, 2, 1_000_000)
     start = find_limit_cycle(simple).state if state is None else section_map.require_state(state)
-    neutral = np.abs(cycle_at(section_map, start).eigenvalues - 1.0) < section_map.neutral_within
-    curve = _Curve(section_map, parameter, start, high - low, int(neutral.sum()))
-    point = curve.start(1.0 if upward else -1.0)
-    points, events = [point], []
+    curve = _Curve(section_map, parameter, start, (low, high))
+    points, events = [curve.start(1.0 if upward else -1.0)], []
     step, ended = min(_FIRST_STEP, longest_step), "the asked number of points"
-    with Counter("continuation", progress) as counter:
+    with closing(progress_bar("continuation", progress)) as bar:
         while len(points) < most_points:
-            following, step, why = _next_point(curve, points[-1], step, longest_step, (low, high))
+            following, step, why = _next_point(curve, points[-1], step, longest_step)
             if following is None:
                 ended = why
                 break
             events.extend(_events(curve, points[-1], following))
             points.append(following)
-            counter.advance()
-            if curve.value(following) in (low, high):
-                ended = f"{parameter} reached {curve.value(following):g}"
+            bar.update()
+            if following.value in (low, high):
+                ended = f"{parameter} reached {following.value:g}"
                 break
     return Branch(
         parameter=parameter,
-        values=np.array([curve.value(p) for p in points]),
-        states=np.array([curve.state(p.place) for p in points]),
-        eigenvalues=np.array([p.eigenvalues for p in points]),
+        values=np.array([point.value for point in points]),
+        states=np.array([point.state for point in points]),
+        eigenvalues=np.array([point.eigenvalues for point in points]),
         n_steps=section_map.n_steps,
         events=tuple(events),
         ended=ended,
@@ -194,93 +213,67 @@ def continue_gait(
 
 @dataclass(frozen=True)
 class _Point:
-    """A point of the branch in scaled coordinates, the parameter last; its tangent, multipliers."""
+    """A point of the branch: its ``place`` and ``tangent`` in scaled coordinates, the parameter last, and what is there.
+
+    ``answering`` are the eigenvalues without those that are neutral all along the branch; so many ``iterations`` of Newton's method led to it.
+    """
 
     place: Vector
     tangent: Vector
+    value: float
+    state: Vector
     eigenvalues: NDArray[np.complex128]
     answering: NDArray[np.complex128]
-    """The eigenvalues without those that are neutral all along the branch."""
     iterations: int
-    limit: float | None = None
-    """The parameter's value, where it is a limit that rounding must not pass."""
 
 
-@dataclass(frozen=True)
 class _Curve:
-    """The scaled curve of fixed points in the space of free coordinates and parameter."""
+    """The scaled curve of fixed points in the space of free coordinates and parameter, within limits of the parameter."""
 
-    section_map: SectionMap
-    parameter: str
-    template: Vector
-    parameter_scale: float
-    neutral: int
-    """How many multipliers are neutral wherever the gait is."""
-
-    @property
-    def scales(self) -> Vector:
-        return np.append(np.full(len(self.section_map.free), STATE_SCALE), self.parameter_scale)
-
-    @property
-    def residual_limit(self) -> float:
-        return max(_RESIDUAL, self.section_map.precision)
-
-    def _solved(self, bordered: Vector, wanted: Vector) -> Vector:
-        return least_change(bordered, wanted, self.section_map.precision)
-
-    def value(self, point: _Point) -> float:
-        return float(point.place[-1] * self.parameter_scale) if point.limit is None else point.limit
-
-    def state(self, place: Vector) -> Vector:
-        state = self.template.copy()
-        state[self.section_map.free] = (place * self.scales)[:-1]
-        return state
-
-    def equations(self, place: Vector, limit: float | None) -> tuple[Vector, Vector, Vector]:
-        """Residual (m,), its scaled derivative (m, m + 1), and the map's own Jacobian (m, m)."""
-        value = float(place[-1] * self.parameter_scale) if limit is None else limit
-        moved = self.section_map.moved(self.parameter, value)
-        free, state = self.section_map.free, self.state(place)
-        image, matrix, by_parameter = moved.sensitivity(state, self.parameter)
-        own = matrix[np.ix_(free, free)]
-        whole = np.column_stack([own - np.eye(len(free)), by_parameter[free]])
-        return (image - state)[free], whole * self.scales, own
+    def __init__(
+        self, section_map: SectionMap, parameter: str, start: Vector, limits: tuple[float, float]
+    ) -> None:
+        self.limits, self.range = limits, limits[1] - limits[0]
+        self._map, self._parameter, self._start = section_map, parameter, start
+        self._free = section_map.free
+        self._scales = np.append(np.full(len(self._free), STATE_SCALE), self.range)
+        self._residual_limit = max(_RESIDUAL, section_map.precision)
+        from_one = np.abs(cycle_at(section_map, start).eigenvalues - 1.0)
+        self._neutral = int((from_one < section_map.neutral_within).sum())
 
     def start(self, direction: float) -> _Point:
-        place = (
-            np.append(self.template[self.section_map.free], self.section_map.value(self.parameter))
-            / self.scales
-        )
-        along = np.zeros(place.size)
-        along[-1] = direction
-        return self.corrected(place, along, self.section_map.value(self.parameter))
+        """The point to start from, where the parameter grows or falls at first."""
+        value = self._map.value(self._parameter)
+        place = np.append(self._start[self._free], value) / self._scales
+        return self.corrected(place, direction * np.eye(place.size)[-1], value)
 
     def corrected(self, place: Vector, along: Vector, limit: float | None = None) -> _Point:
         """The branch's point in the plane through ``place`` square to ``along``.
 
-        With ``limit``, ``along`` is along the parameter, which has that value in the plane.
+        With ``limit``, ``along`` is along the parameter, which has exactly that value in the plane, whatever the rounding of its place.
 
         Raises
         ------
         NoGaitError, ValueError
             If Newton's method does not reach it.
         """
-        anchor = place
+        anchor, free = place, self._free
         for iteration in range(_NEWTON_STEPS):
-            residual, slope, own = self.equations(place, limit)
+            value = float(place[-1] * self.range) if limit is None else limit
+            state = self._start.copy()
+            state[free] = (place * self._scales)[:-1]
+            moved = self._map.moved(self._parameter, value)
+            image, matrix, by_parameter = moved.sensitivity(state, self._parameter)
+            own, residual = matrix[np.ix_(free, free)], (image - state)[free]
+            slope = np.column_stack([own - np.eye(len(free)), by_parameter[free]]) * self._scales
             bordered = np.vstack([slope, along])
-            if iteration > 0 and float(np.abs(residual).max()) < self.residual_limit:
+            if iteration > 0 and float(np.abs(residual).max()) < self._residual_limit:
                 tangent = self._solved(bordered, np.append(np.zeros(residual.size), 1.0))
+                tangent /= np.linalg.norm(tangent)
                 eigenvalues = sorted_eigenvalues(own)
                 nearest_one = np.argsort(np.abs(eigenvalues - 1.0), kind="stable")
-                return _Point(
-                    place=place,
-                    tangent=tangent / np.linalg.norm(tangent),
-                    eigenvalues=eigenvalues,
-                    answering=eigenvalues[np.sort(nearest_one[self.neutral :])],
-                    iterations=iteration,
-                    limit=limit,
-                )
+                answering = eigenvalues[np.sort(nearest_one[self._neutral :])]
+                return _Point(place, tangent, value, state, eigenvalues, answering, iteration)
             miss = np.append(residual, along @ (place - anchor))
             place = place - self._solved(bordered, miss)
         raise NoGaitError("Newton's method does not reach the branch")
@@ -289,15 +282,18 @@ class _Curve:
         """The branch's point at this arclength along the tangent."""
         return self.corrected(point.place + length * point.tangent, point.tangent)
 
+    def _solved(self, bordered: Vector, wanted: Vector) -> Vector:
+        return least_change(bordered, wanted, self._map.precision)
+
 
 def _next_point(
-    curve: _Curve, point: _Point, step: float, longest: float, limits: tuple[float, float]
+    curve: _Curve, point: _Point, step: float, longest: float
 ) -> tuple[_Point | None, float, str]:
     """The next point with the step to try after it, or None and why the branch ends."""
     why = ""
     while step >= _SMALLEST_STEP:
         try:
-            found = _attempt(curve, point, step, limits)
+            found = _attempt(curve, point, step)
         except (LeanYawError, ValueError, np.linalg.LinAlgError) as error:
             why, step = str(error), 0.5 * step
             continue
@@ -309,31 +305,19 @@ def _next_point(
     return None, step, why
 
 
-def _attempt(curve: _Curve, point: _Point, step: float, limits: tuple[float, float]) -> _Point:
+def _attempt(curve: _Curve, point: _Point, step: float) -> _Point:
     """The point a step further, or on the parameter's limit where the step would go beyond."""
-    ahead = float(point.place[-1] + step * point.tangent[-1]) * curve.parameter_scale
-    limit = min(max(ahead, limits[0]), limits[1])
+    low, high = curve.limits
+    ahead = float(point.place[-1] + step * point.tangent[-1]) * curve.range
+    limit = min(max(ahead, low), high)
     if limit == ahead:
         found = curve.beyond(point, step)
-        if not limits[0] <= curve.value(found) <= limits[1]:
+        if not low <= found.value <= high:
             raise NoGaitError("the branch leaves the interval")
         return found
-    length = (limit / curve.parameter_scale - point.place[-1]) / point.tangent[-1]
-    along = np.zeros(point.place.size)
-    along[-1] = np.sign(point.tangent[-1])
+    length = (limit / curve.range - point.place[-1]) / point.tangent[-1]
+    along = np.sign(point.tangent[-1]) * np.eye(point.place.size)[-1]
     return curve.corrected(point.place + length * point.tangent, along, limit)
-
-
-def _fold_test(point: _Point) -> float:
-    return float(point.tangent[-1])
-
-
-def _plus_test(point: _Point) -> float:
-    return float(np.real(np.prod(point.answering - 1.0)))
-
-
-def _minus_test(point: _Point) -> float:
-    return float(np.real(np.prod(point.answering + 1.0)))
 
 
 def _pair_test(point: _Point) -> float:
@@ -343,19 +327,21 @@ def _pair_test(point: _Point) -> float:
     return float(np.real(np.prod(values[first] * values[second] - 1.0)))
 
 
-_TESTS: tuple[tuple[EventKind, Callable[[_Point], float], complex], ...] = (
-    ("fold", _fold_test, 1.0),
-    ("real +1", _plus_test, 1.0),
-    ("real -1", _minus_test, -1.0),
-    ("complex pair", _pair_test, 1j),
-)
+_TESTS: dict[EventKind, tuple[Callable[[_Point], float], complex]] = {
+    "fold": (lambda point: float(point.tangent[-1]), 1.0),
+    "real +1": (lambda point: float(np.real(np.prod(point.answering - 1.0))), 1.0),
+    "real -1": (lambda point: float(np.real(np.prod(point.answering + 1.0))), -1.0),
+    "complex pair": (_pair_test, 1j),
+}
+"""By the kind of event: a function that changes sign there, and the multiplier on the circle."""
 
 
 def _events(curve: _Curve, point: _Point, following: _Point) -> list[Event]:
     """Crossings of the unit circle between two points, in their order."""
     whole = float((following.place - point.place) @ point.tangent)
     found: list[tuple[float, Event]] = []
-    for kind, test, circle in _TESTS:
+    outside = [int((np.abs(each.answering) > 1.0).sum()) for each in (point, following)]
+    for kind, (test, circle) in _TESTS.items():
         before, after = test(point), test(following)
         if before == 0.0 or before * after >= 0.0:
             continue
@@ -369,17 +355,12 @@ def _events(curve: _Curve, point: _Point, following: _Point) -> list[Event]:
             continue  # the corrector fails in between: nothing can be said
         place = curve.beyond(point, length)
         eigenvalue = _critical(place, kind, circle)
-        if eigenvalue is None:
-            continue
-        if any(
-            other.kind == "fold" and kind == "real +1" and abs(at - length) < 1e-6
-            for at, other in found
-        ):
-            continue  # a fold is a real +1 already
-        outside = [int((np.abs(p.answering) > 1.0).sum()) for p in (point, following)]
-        event = Event(
-            kind, curve.value(place), curve.state(place.place), eigenvalue, outside[1] > outside[0]
+        is_fold_too = kind == "real +1" and any(
+            event.kind == "fold" and abs(at - length) < 1e-6 for at, event in found
         )
+        if eigenvalue is None or is_fold_too:
+            continue
+        event = Event(kind, place.value, place.state, eigenvalue, outside[1] > outside[0])
         found.append((length, event))
     return [event for _, event in sorted(found, key=lambda pair: pair[0])]
 
@@ -390,17 +371,7 @@ def _critical(point: _Point, kind: EventKind, circle: complex) -> complex | None
     if kind != "complex pair":
         return complex(values[np.argmin(np.abs(values - circle))])
     upper = values[np.imag(values) > _NOT_REAL]
-    if upper.size == 0 or np.abs(np.abs(upper) - 1.0).min() > _SAME_PLACE**0.5:
+    from_circle = np.abs(np.abs(upper) - 1.0)
+    if from_circle.min(initial=np.inf) > _SAME_PLACE**0.5:
         return None
-    return complex(upper[np.argmin(np.abs(np.abs(upper) - 1.0))])
-
-
-def _require_limits(
-    limits: tuple[float, float], parameter: str, value: float
-) -> tuple[float, float]:
-    low, high = (float(limit) for limit in limits)
-    if not low < high:
-        raise ValueError(f"limits must be (low, high) with low < high, got {limits!r}")
-    if not low <= value <= high:
-        raise ValueError(f"limits must hold the start's {parameter}, {value:g}, got {limits!r}")
-    return low, high
+    return complex(upper[from_circle.argmin()])

@@ -10,10 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from lean_yaw_env.analysis.continuation import Branch, continue_gait
-from lean_yaw_env.analysis.limit_cycle import cycle_at, find_limit_cycle
+from lean_yaw_env.analysis.continuation import continue_gait
+from lean_yaw_env.analysis.limit_cycle import LimitCycle, cycle_at, find_limit_cycle
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.parameters import INTER_LEG_ANGLE
+from lean_yaw_env.validation import require_instance
 from lean_yaw_env.vehicles.stability import SpeedRange, stable_speed_range
 from lean_yaw_env.walker import Walker
 
@@ -23,14 +24,9 @@ _TRIED = tuple(np.geomspace(0.0005, 0.25, 28).tolist())
 """Slopes at which a stable gait is looked for, the gentlest first."""
 
 
+@stable_speed_range.register(Walker)
 def stable_speeds(walker: Walker, *, inter_leg_angle: float = INTER_LEG_ANGLE) -> SpeedRange | None:
-    """Find the lowest range of speeds in which a walker's straight gait is stable.
-
-    Parameters
-    ----------
-    walker : Walker
-        Its slope plays no part.
-    inter_leg_angle : (0, pi/2)
+    """Find the lowest range of speeds in which a walker's straight gait is stable, whatever its slope.
 
     Returns
     -------
@@ -39,43 +35,28 @@ def stable_speeds(walker: Walker, *, inter_leg_angle: float = INTER_LEG_ANGLE) -
         stability or ceases (it lifts off); ``inf`` if neither happens up to a slope of 0.3. None
         if no gait on the slopes tried is stable.
     """
+    require_instance("walker", walker, Walker)
     for slope in _TRIED:
         here = Walker(replace(walker.parameters, slope=slope))
         try:
             cycle = find_limit_cycle(here, inter_leg_angle=inter_leg_angle)
         except NoGaitError:
             continue
-        if not cycle.is_stable:
-            continue
-        down, up = (
-            continue_gait(
-                here,
-                "slope",
-                (LEAST_SLOPE, GREATEST_SLOPE),
-                state=cycle.state,
-                inter_leg_angle=inter_leg_angle,
-                upward=upward,
-                longest_step=0.02,
+        if cycle.is_stable:
+            lower, upper = _end_speed(cycle, upward=False), _end_speed(cycle, upward=True)
+            return SpeedRange(
+                0.0 if lower is None else lower, float("inf") if upper is None else upper
             )
-            for upward in (False, True)
-        )
-        lower = _end_speed(down)
-        upper = _end_speed(up)
-        return SpeedRange(0.0 if lower is None else lower, float("inf") if upper is None else upper)
     return None
 
 
-def _end_speed(branch: Branch) -> float | None:
-    """The speed at which stability, or the gait itself, ends; None if at neither."""
+def _end_speed(cycle: LimitCycle, *, upward: bool) -> float | None:
+    """The speed at which stability, or the gait itself, ends on steeper or gentler slopes; None if at neither."""
+    limits = (LEAST_SLOPE, GREATEST_SLOPE)
+    branch = continue_gait(
+        cycle.section_map, "slope", limits, state=cycle.state, upward=upward, longest_step=0.02
+    )
     for event in branch.events:
         if event.is_leaving:
-            moved = branch.section_map.moved(branch.parameter, event.value)
-            return cycle_at(moved, event.state).speed
-    if branch.values[-1] in (LEAST_SLOPE, GREATEST_SLOPE):
-        return None
-    return branch.cycle(-1).speed
-
-
-@stable_speed_range.register
-def _(walker: Walker) -> SpeedRange | None:
-    return stable_speeds(walker)
+            return cycle_at(branch.section_map.moved("slope", event.value), event.state).speed
+    return None if branch.values[-1] in limits else branch.cycle(-1).speed

@@ -1,13 +1,11 @@
 """A gait's modes: eigenvectors of its Jacobian, each named by the motion it is about.
 
-A mode is fore-aft where only pitch and swing take part, three-dimensional where heading and ankle
-do. Shares are participation factors, left times right eigenvector entry by entry, which depend on no
-choice of units. Without hip width each mode is purely one or the other; with it, the larger share
-names it.
+A mode is fore-aft where only pitch and swing take part, three-dimensional where heading and ankle do. Shares are participation factors, left
+times right eigenvector entry by entry, which depend on no choice of units. Without hip width each mode is purely one or the other; with it,
+the larger share names it.
 
-The paper prints two zeros for the flat passive walker. One is exact, see ``Mode.explanation``. The
-other, of its three-dimensional modes, is 3e-4 at its ankle tilt of 0.15: it is zero where the ankle
-axis is vertical at heel strike, which makes the strike forget the lean.
+The paper prints two zeros for the flat passive walker. One is exact, see ``Mode.explanation``. The other, of its three-dimensional modes, is
+3e-4 at its ankle tilt of 0.15: it is zero where the ankle axis is vertical at heel strike, which makes the strike forget the lean.
 """
 
 from __future__ import annotations
@@ -21,6 +19,7 @@ from scipy import linalg
 
 from lean_yaw_env.analysis.limit_cycle import LimitCycle
 from lean_yaw_env.analysis.section_map import Motion
+from lean_yaw_env.validation import require_instance
 
 ZERO = 1e-6
 """A multiplier below this is zero but for round-off: its disturbance is gone within a cycle."""
@@ -69,18 +68,9 @@ class Mode:
 
 
 def modes(cycle: LimitCycle) -> tuple[Mode, ...]:
-    """Take a gait's Jacobian apart, by falling magnitude of the multipliers.
-
-    Parameters
-    ----------
-    cycle : LimitCycle
-
-    Returns
-    -------
-    tuple of Mode
-        As many as ``cycle.eigenvalues``.
-    """
-    values, left, right = _eigen(cycle.jacobian)
+    """Take a gait's Jacobian apart: as many modes as ``cycle.eigenvalues``, by falling magnitude."""
+    require_instance("cycle", cycle, LimitCycle)
+    values, left, right = linalg.eig(cycle.jacobian, left=True, right=True)  # pyright: ignore[reportAssignmentType]
     found = [
         _mode(cycle, complex(value), np.conj(backward), forward)
         for value, backward, forward in zip(values, left.T, right.T, strict=True)
@@ -99,9 +89,10 @@ def _mode(
     section_map = cycle.section_map
     of_name = dict(zip(section_map.names, section_map.motions, strict=True))
     motions = np.array([of_name[name] for name in cycle.coordinates])
-    shares = {each: float(weights[motions == each].sum() / weights.sum()) for each in _MOTIONS}
-    lateral = 1.0 - shares["pitch"]
-    is_zero = abs(value) < ZERO
+    shares: dict[Motion, float] = {
+        each: float(weights[motions == each].sum() / weights.sum()) for each in get_args(Motion)
+    }
+    lateral, is_zero = 1.0 - shares["pitch"], abs(value) < ZERO
     bound = float(np.abs(left) @ cycle.jacobian_error @ np.abs(right))
     overlap = float(abs(left @ right))
     return Mode(
@@ -111,17 +102,8 @@ def _mode(
         left_vector=left.astype(complex),
         name="three-dimensional" if lateral > 0.5 else "fore-aft",
         lateral_share=lateral,
-        about=max(_MOTIONS, key=lambda each: shares[each]),
+        about=max(shares, key=lambda each: shares[each]),
         is_zero=is_zero,
         is_neutral=abs(value - 1.0) < section_map.neutral_within,
         explanation=section_map.zero_explanation if is_zero else "",
     )
-
-
-_MOTIONS: tuple[Motion, ...] = get_args(Motion)
-
-
-def _eigen(matrix: NDArray[np.float64]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Eigenvalues, left and right eigenvectors (columns)."""
-    values, left, right = linalg.eig(matrix, left=True, right=True)  # pyright: ignore[reportAssignmentType]
-    return values, left, right

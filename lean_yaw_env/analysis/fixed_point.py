@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
 
 import numpy as np
 from scipy.optimize import root
 
-from lean_yaw_env.analysis.section_map import RESIDUAL_LIMIT, SectionMap
+from lean_yaw_env.analysis.section_map import SectionMap
 from lean_yaw_env.errors import LeanYawError, NoGaitError
 from lean_yaw_env.parameters import Vector
-
-__all__ = [
-    "RESIDUAL_LIMIT",
-    "follow_fixed_point",
-    "least_change",
-    "side_of_folds",
-    "solve_fixed_point",
-]
 
 _NEWTON_STEPS = 30
 _SHARES = (1.0, 0.5, 0.25, 0.125)
@@ -27,20 +18,12 @@ _ROUND_OFF = 1e-16
 _FIRST_PIECE = 0.25
 _SMALLEST_PIECE = 1.0 / 256.0
 
-Map = TypeVar("Map", bound=SectionMap)
-
 
 def solve_fixed_point(section_map: SectionMap, guess: Vector, *, exact: bool = True) -> Vector:
-    """The fixed point that the root finder reaches from a guess.
+    """The fixed point that the root finder reaches from a guess (k,); coordinates that are not free stay as they are.
 
-    Parameters
-    ----------
-    section_map : SectionMap
-    guess : shape (k,)
-        Coordinates that are not free stay as they are.
-    exact : bool
-        Newton's method with the map's Jacobian; otherwise a root finder that estimates its own
-        slopes, so that nothing but the step itself is compiled.
+    It is Newton's method with the map's Jacobian or, if not ``exact``, a root finder that estimates its own slopes, so that nothing but the
+    step itself is compiled.
 
     Raises
     ------
@@ -111,16 +94,19 @@ def _secant(section_map: SectionMap, guess: Vector) -> tuple[Vector, float]:
         return state
 
     def change(x: Vector) -> Vector:
-        state = full(x)
-        return (section_map.image(state) - state)[free]
+        return section_map.image(full(x))[free] - x
 
     x = root(change, guess[free], options={"xtol": 1e-15}).x
     return full(x), float(np.abs(change(x)).max())
 
 
 def follow_fixed_point(
-    path: Callable[[float], Map], start: Vector, *, exact: bool = True, side: float | None = None
-) -> tuple[Map, Vector]:
+    path: Callable[[float], SectionMap],
+    start: Vector,
+    *,
+    exact: bool = True,
+    side: float | None = None,
+) -> Vector:
     """Follow a fixed point along a path of maps from 0 to 1, in pieces that shrink where it fails.
 
     Parameters
@@ -133,11 +119,6 @@ def follow_fixed_point(
     side : +1 or -1, optional
         Only fixed points on this side of folds are followed, see ``side_of_folds``.
 
-    Returns
-    -------
-    map, state
-        At the end of the path.
-
     Raises
     ------
     NoGaitError
@@ -145,13 +126,10 @@ def follow_fixed_point(
     """
     state = solve_fixed_point(path(0.0), start, exact=exact)
     reached, piece = 0.0, _FIRST_PIECE
-    previous: tuple[float, Vector] | None = None
+    earlier, before = state, -np.inf
     while reached < 1.0:
         target = min(1.0, reached + piece)
-        guess = state
-        if previous is not None:
-            share = (target - reached) / (reached - previous[0])
-            guess = state + share * (state - previous[1])
+        guess = state + (target - reached) / (reached - before) * (state - earlier)
         try:
             found = solve_fixed_point(path(target), guess, exact=exact)
             if side is not None and side_of_folds(path(target), found) != side:
@@ -161,6 +139,6 @@ def follow_fixed_point(
             if piece < _SMALLEST_PIECE:
                 raise NoGaitError(f"it ended at {reached:.3f} of the way: {error}") from error
             continue
-        previous, reached, state = (reached, state), target, found
+        earlier, before, reached, state = state, reached, target, found
         piece *= 1.5
-    return path(1.0), state
+    return state

@@ -6,7 +6,9 @@ walked anyway, and takes another only where the residual does not fall fast.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,17 +41,9 @@ Flags = NDArray[np.bool_]
 class WalkerGrid:
     """``n`` active walkers with their commands.
 
-    Attributes
-    ----------
-    bodies : shape (n, 11)
-        In the order of ``kernel.records.Body``.
-    inter_leg_angles : shape (n,)
-    offsets : shape (n, 2)
-        In force while the left and while the right foot stands.
-    is_symmetric : shape (n,)
-        Whether right steps mirror left ones; a gait is then a fixed point of one mirrored step, otherwise of a stride.
-    threads : int
-        That share each batch.
+    ``bodies`` (n, 11) are in the order of ``kernel.records.Body``, ``inter_leg_angles`` (n,). ``offsets`` (n, 2) are in force while the left and
+    while the right foot stands. Where a walker ``is_symmetric`` (n,), right steps mirror left ones; a gait is then a fixed point of one
+    mirrored step, otherwise of a stride. So many ``threads`` share each batch.
     """
 
     bodies: Vector
@@ -65,12 +59,8 @@ class WalkerGrid:
     def at(self, index: Index | Flags) -> WalkerGrid:
         """Some of the walkers."""
         return WalkerGrid(
-            self.bodies[index],
-            self.inter_leg_angles[index],
-            self.offsets[index],
-            self.is_symmetric[index],
-            self.threads,
-        )
+            self.bodies[index], self.inter_leg_angles[index], self.offsets[index], self.is_symmetric[index], self.threads
+        )  # fmt: skip
 
     def towards(self, share: Vector, *, width_first: bool) -> WalkerGrid:
         """On the way (n,), from 0 to 1, from no hip width and no offset: both grow together, or the offsets in the second half."""
@@ -84,40 +74,31 @@ class WalkerGrid:
         """Whether headings differ, shape (n,)."""
         return (self.bodies[:, _SLOPE] != 0.0) & (self.bodies[:, _SLOPE_TURNS] == 0.0)
 
-    def commands(self, foot: int) -> Vector:
-        """Commands (n, 3) of steps on the left (0) or right (1) foot."""
-        return np.column_stack(
-            [self.inter_leg_angles, self.offsets[:, foot], self.offsets[:, 1 - foot]]
-        )
-
     def step(self, states: Vector, foot: int) -> Vector:
-        """Outcomes (n, 18) of a step, in the order of ``kernel.records.Outcome``."""
-        n = self.n
-        rows = np.empty((n, len(Outcome._fields)))
-        commands, sides = self.commands(foot), np.full(n, 1.0 - 2.0 * foot)
-        states = np.ascontiguousarray(states)
-        share_out(
-            lambda first, last: step_batch(self.bodies, commands, states, sides, rows, first, last),
-            n,
-            self.threads,
-        )
+        """Outcomes (n, 18) of a step on the left (0) or right (1) foot, in the order of ``kernel.records.Outcome``."""
+        rows = np.empty((self.n, len(Outcome._fields)))
+        self._run(step_batch, states, foot, rows)
         return rows
 
     def differentiate(self, states: Vector, foot: int) -> tuple[Vector, Vector, Flags]:
         """States (n, 5) after a step, its Jacobians (n, 5, 5), and whether it was completed (n,)."""
-        n = self.n
-        statuses, afters = np.empty(n), np.empty((n, STATE_SIZE))
-        rows = np.empty((n, STATE_SIZE, STATE_SIZE))
-        commands, sides = self.commands(foot), np.full(n, 1.0 - 2.0 * foot)
-        states = np.ascontiguousarray(states)
-        share_out(
-            lambda first, last: step_jacobians(
-                self.bodies, commands, states, sides, statuses, afters, rows, first, last
-            ),
-            n,
-            self.threads,
-        )
+        statuses, afters = np.empty(self.n), np.empty((self.n, STATE_SIZE))
+        rows = np.empty((self.n, STATE_SIZE, STATE_SIZE))
+        self._run(step_jacobians, states, foot, statuses, afters, rows)
         return afters, rows, statuses == STEPPED
+
+    def _run(
+        self, kernel: Callable[..., None], states: Vector, foot: int, *results: Vector
+    ) -> None:
+        offsets = self.offsets if foot == 0 else self.offsets[:, ::-1]
+        commands = np.column_stack([self.inter_leg_angles, offsets])
+        given = (
+            self.bodies,
+            commands,
+            np.ascontiguousarray(states),
+            np.full(self.n, 1.0 - 2.0 * foot),
+        )
+        share_out(lambda first, last: kernel(*given, *results, first, last), self.n, self.threads)
 
     def residual(self, states: Vector) -> tuple[Vector, Flags]:
         """Change (n, 5) over a mirrored step of symmetric walkers, over a stride of others, and whether it was completed (n,).
@@ -126,9 +107,8 @@ class WalkerGrid:
         """
         rows = self.step(states, 0)
         image, stepped = rows[:, :STATE_SIZE].copy(), rows[:, _STATUS] == STEPPED
-        symmetric = self.is_symmetric
-        image[symmetric] *= MIRROR
-        rest = np.flatnonzero(~symmetric & stepped)
+        image[self.is_symmetric] *= MIRROR
+        rest = np.flatnonzero(~self.is_symmetric & stepped)
         if rest.size:
             rows = self.at(rest).step(image[rest], 1)
             image[rest], stepped[rest] = rows[:, :STATE_SIZE], rows[:, _STATUS] == STEPPED
@@ -139,33 +119,30 @@ class WalkerGrid:
     def jacobian(self, states: Vector) -> tuple[Vector, Flags]:
         """Jacobians (n, 5, 5) of the same map, and whether it was completed (n,)."""
         image, matrix, stepped = self.differentiate(states, 0)
-        symmetric = self.is_symmetric
-        matrix[symmetric] *= MIRROR[:, None]
-        rest = np.flatnonzero(~symmetric & stepped)
+        matrix[self.is_symmetric] *= MIRROR[:, None]
+        rest = np.flatnonzero(~self.is_symmetric & stepped)
         if rest.size:
             _, second, stepped[rest] = self.at(rest).differentiate(image[rest], 1)
             matrix[rest] = second @ matrix[rest]
         return matrix, stepped
 
 
-@dataclass(frozen=True)
-class GridGaits:
-    """Gaits of a ``WalkerGrid``; rows where none was found hold nan.
+class GridGaits(NamedTuple):
+    """Gaits of the walkers ``index`` (m,) of a grid.
 
-    Attributes
-    ----------
-    found : shape (n,)
-    states : shape (n, 5)
-    strides : shape (n, 5, 5)
-        Jacobians of the stride.
-    outcomes : shape (n, 2, 18)
-        Both steps in the order of ``kernel.records.Outcome``.
+    ``states`` (m, 5), the strides' Jacobians ``strides`` (m, 5, 5), and the ``outcomes`` (m, 2, 18) of both steps in the order of
+    ``kernel.records.Outcome``.
     """
 
-    found: Flags
+    index: Index
     states: Vector
     strides: Vector
     outcomes: Vector
+
+    def at(self, some: Flags) -> GridGaits:
+        return GridGaits(
+            self.index[some], self.states[some], self.strides[some], self.outcomes[some]
+        )
 
 
 def solve_grid(grid: WalkerGrid, guesses: Vector) -> GridGaits:
@@ -183,22 +160,17 @@ def follow_grid(grid: WalkerGrid, starts: Vector) -> GridGaits:
     """
     search = _Search(grid.n)
     found = np.zeros(grid.n, dtype=bool)
-    _follow(grid, starts, search, np.flatnonzero(_is_sane(starts)), found, width_first=False)
-    rest = np.flatnonzero(~found & _is_sane(starts) & (grid.offsets != 0.0).any(axis=1))
-    _follow(grid, starts, search, rest, found, width_first=True)
+    who = np.flatnonzero(_is_sane(starts))
+    found[who] = _follow(grid, starts, search, who, width_first=False)
+    who = who[~found[who] & (grid.offsets[who] != 0.0).any(axis=1)]
+    found[who] = _follow(grid, starts, search, who, width_first=True)
     return _described(grid, search, found)
 
 
 def _follow(
-    grid: WalkerGrid,
-    starts: Vector,
-    search: _Search,
-    who: Index,
-    found: Flags,
-    *,
-    width_first: bool,
-) -> None:
-    """Follow the gaits of some walkers, and say in ``found`` which have come to their end."""
+    grid: WalkerGrid, starts: Vector, search: _Search, who: Index, *, width_first: bool
+) -> Flags:
+    """Follow the gaits of some walkers; which have come to their end."""
     n = grid.n
     reached, piece = np.zeros(n), np.full(n, _FIRST_PIECE)
     latest, earlier, reached_before = starts.copy(), starts.copy(), np.full(n, np.nan)
@@ -217,18 +189,14 @@ def _follow(
         piece[good] *= 1.5
         piece[bad] *= 0.25
         flying = flying[(reached[flying] < 1.0) & (piece[flying] >= _SMALLEST_PIECE)]
-    found[who] = reached[who] >= 1.0
+    return reached[who] >= 1.0
 
 
 class _Search:
     """Newton's method for ``n`` walkers, which remembers where each one is and its inverse Jacobian.
 
-    Attributes
-    ----------
-    states : shape (n, 5)
-        Fixed points where the last search ended well.
-    matrices : shape (n, 5, 5)
-        Exact Jacobians there of the walkers that have come to their end.
+    ``states`` (n, 5) are the fixed points where the last search ended well, ``matrices`` (n, 5, 5) the exact Jacobians there of the walkers
+    that have come to their end.
     """
 
     def __init__(self, n: int) -> None:
@@ -324,18 +292,10 @@ def _is_sane(states: Vector) -> Flags:
 
 def _described(grid: WalkerGrid, search: _Search, found: Flags) -> GridGaits:
     """The gaits found, with both steps and the stride's Jacobian."""
-    found, states = found.copy(), np.full((grid.n, STATE_SIZE), np.nan)
-    strides = np.full((grid.n, STATE_SIZE, STATE_SIZE), np.nan)
-    outcomes = np.full((grid.n, 2, len(Outcome._fields)), np.nan)
     index = np.flatnonzero(found)
-    steps = np.empty((index.size, 2, len(Outcome._fields)))
-    steps[:, 0] = grid.at(index).step(search.states[index], 0)
-    steps[:, 1] = grid.at(index).step(steps[:, 0, :STATE_SIZE], 1)
-    stepped = (steps[:, :, _STATUS] == STEPPED).all(axis=1)
-    found[index[~stepped]] = False
-    index = index[stepped]
-    states[index], outcomes[index] = search.states[index], steps[stepped]
-    strides[index] = search.matrices[index]
-    symmetric = index[grid.is_symmetric[index]]
-    strides[symmetric] = strides[symmetric] @ strides[symmetric]
-    return GridGaits(found, states, strides, outcomes)
+    some, states, strides = grid.at(index), search.states[index], search.matrices[index]
+    first = some.step(states, 0)
+    outcomes = np.stack([first, some.step(first[:, :STATE_SIZE], 1)], axis=1)
+    strides[some.is_symmetric] = strides[some.is_symmetric] @ strides[some.is_symmetric]
+    is_whole = (outcomes[:, :, _STATUS] == STEPPED).all(axis=1)
+    return GridGaits(index, states, strides, outcomes).at(is_whole)

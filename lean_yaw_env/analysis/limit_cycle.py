@@ -5,31 +5,48 @@ Iterating strides finds no gait in practice: Table 1's converges by 0.986 a stri
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lean_yaw_env.analysis.active_map import ActiveMap, planar_gait_rate, search_active
-from lean_yaw_env.analysis.fixed_point import RESIDUAL_LIMIT
+from lean_yaw_env.analysis.active_map import ActiveMap, search_active
+from lean_yaw_env.analysis.fixed_point import solve_fixed_point
+from lean_yaw_env.analysis.passive_map import PassiveMap
 from lean_yaw_env.analysis.path import axle_middle, distance_walked, turning_radius
-from lean_yaw_env.analysis.section_map import CycleStep, SectionMap, section_map_of
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, Vector
+from lean_yaw_env.analysis.section_map import (
+    CommandArguments,
+    CycleStep,
+    SectionMap,
+    WalkerOrMap,
+    section_map_of,
+)
+from lean_yaw_env.errors import LeanYawError, NoGaitError
+from lean_yaw_env.parameters import Vector
 from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.validation import require_count
 from lean_yaw_env.walker import Walker
 
-__all__ = [
-    "RESIDUAL_LIMIT",
-    "LimitCycle",
-    "cycle_at",
-    "find_gait",
-    "find_limit_cycle",
-    "find_passive_gaits",
-    "planar_gait_rate",
-    "sorted_eigenvalues",
-    "spectral_radii",
-]
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from lean_yaw_env.viewer import PageDisplay
+
+OF_STEPS = (
+    "duration", "displacement", "least_normal_force", "greatest_friction", "gravity_work", "shift_work"
+)  # fmt: skip
+"""What ``numbers_of_cycles`` takes of each step."""
+
+_KICKS = (1e-3, -1e-3, 1e-2, -1e-2)
+"""How far along the unstable mode to start, as a share of the state's length."""
+_SETTLING = 600
+"""Cycles to let the walk settle; slowest just past the doubling."""
+_RECURS = 1e-9
+_DIFFERENT = 1e-7
+"""A cycle whose halves are closer than this has the half period."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +74,14 @@ class LimitCycle:
         Of the cycle.
     section_map : SectionMap
         The map of which the gait is the fixed point.
+    duration, distance : float
+        Of the cycle; the distance is from a footprint to the same foot's next one, the mean of both feet.
+    speed, step_length, stride_period : float
+        Distance over time, distance of a step, and duration of two steps.
+    gravity_work, shift_work : float
+        What gravity gives, and what moving the masses puts in, per distance, in weights.
+    least_normal_force, greatest_friction : float
+        Least normal force, in weights, and greatest ratio of tangential to normal force.
     """
 
     state: Vector
@@ -67,6 +92,15 @@ class LimitCycle:
     coordinates: tuple[str, ...]
     steps: tuple[CycleStep, ...] = field(repr=False)
     section_map: SectionMap = field(repr=False)
+    duration: float
+    distance: float
+    speed: float
+    step_length: float
+    stride_period: float
+    gravity_work: float
+    shift_work: float
+    least_normal_force: float
+    greatest_friction: float
 
     @property
     def n_steps(self) -> int:
@@ -95,54 +129,29 @@ class LimitCycle:
         return float(np.log(0.5) / np.log(radius)) if 0.0 < radius < 1.0 else float("inf")
 
     @property
-    def duration(self) -> float:
-        """Of the cycle."""
-        return sum(step.duration for step in self.steps)
-
-    @cached_property
-    def distance(self) -> float:
-        """Walked in the cycle: from a footprint to the same foot's next one, the mean of both feet."""
-        return float(distance_walked([step.displacement for step in self.steps], self.turn))
-
-    @property
-    def stride_period(self) -> float:
-        """Duration of two steps."""
-        return 2.0 * self.duration / len(self.steps)
-
-    @property
-    def speed(self) -> float:
-        """Distance over time."""
-        return self.distance / self.duration
-
-    @property
-    def step_length(self) -> float:
-        """Distance of a step."""
-        return self.distance / len(self.steps)
-
-    @property
-    def gravity_work(self) -> float:
-        """What gravity gives per distance, in weights."""
-        return sum(step.gravity_work for step in self.steps) / self.distance
-
-    @property
-    def shift_work(self) -> float:
-        """What moving the masses puts in per distance, in weights."""
-        return sum(step.shift_work for step in self.steps) / self.distance
-
-    @property
     def cost_of_transport(self) -> float:
         """Work of gravity and of moving the masses, per weight and distance."""
         return self.gravity_work + self.shift_work
 
-    @property
-    def least_normal_force(self) -> float:
-        """Least normal force, in weights."""
-        return min(step.least_normal_force for step in self.steps)
+    def show(self, n_steps: int = 40, height: int = 620) -> PageDisplay:
+        """So many steps of the gait on the web page, for a notebook; ``height`` is in pixels. See ``Walk.show``.
 
-    @property
-    def greatest_friction(self) -> float:
-        """Greatest ratio of tangential to normal force."""
-        return max(step.greatest_friction for step in self.steps)
+        Raises
+        ------
+        ValueError
+            If it is no gait of a ``Walker`` with constant commands.
+        """
+        if not isinstance(self.section_map, ActiveMap):
+            raise ValueError(f"only a Walker's gait can be shown, got one of {self.section_map}")
+        commands = [self.steps[k % len(self.steps)].command for k in range(n_steps)]
+        walk = self.section_map.walker.walk(
+            n_steps,
+            state=self.state,
+            inter_leg_angle=[command.inter_leg_angle for command in commands],
+            mass_offset=[command.mass_offset for command in commands],
+            previous_offset=commands[0].previous_offset,
+        )
+        return walk.show(height)
 
     @cached_property
     def turning_radius(self) -> float:
@@ -166,12 +175,28 @@ def spectral_radii(eigenvalues: NDArray[np.complex128], neutral_within: float) -
     return np.abs(eigenvalues).max(axis=-1, initial=0.0, where=answers)
 
 
-def find_limit_cycle(
-    walker: Walker | PassiveWalker | SectionMap,
-    *,
-    inter_leg_angle: float = INTER_LEG_ANGLE,
-    mass_offset: float | tuple[float, float] = 0.0,
-) -> LimitCycle:
+def numbers_of_cycles(steps: Mapping[str, Vector], turn: Vector) -> dict[str, Vector]:
+    """Numbers (...) of cycles by the names in ``LimitCycle``, from those of their n steps by the names ``OF_STEPS`` and the heading gained (...).
+
+    Each of ``steps`` has the shape (..., n), the displacement (..., n, 2).
+    """
+    n = steps["duration"].shape[-1]
+    duration = steps["duration"].sum(axis=-1)
+    distance = distance_walked(steps["displacement"], turn)
+    return {
+        "duration": duration,
+        "distance": distance,
+        "speed": distance / duration,
+        "step_length": distance / n,
+        "stride_period": 2.0 * duration / n,
+        "gravity_work": steps["gravity_work"].sum(axis=-1) / distance,
+        "shift_work": steps["shift_work"].sum(axis=-1) / distance,
+        "least_normal_force": steps["least_normal_force"].min(axis=-1),
+        "greatest_friction": steps["greatest_friction"].max(axis=-1),
+    }
+
+
+def find_limit_cycle(walker: WalkerOrMap, **command: Unpack[CommandArguments]) -> LimitCycle:
     """Find a walker's gait at a constant command, or any map's, with its multipliers.
 
     Parameters
@@ -179,12 +204,11 @@ def find_limit_cycle(
     walker : Walker, PassiveWalker or SectionMap
         Of a passive walker's gaits, the one with the longest period, which alone can be stable.
     inter_leg_angle : (0, pi/2)
-        Of the active walker only.
+        Of a ``Walker`` only.
     mass_offset : [-1, 1], or a pair of them
-        Of the active walker only. One number: an offset that the slope can balance, sin(heading) =
-        -offset / tan(slope), gives a gait across the slope. A pair: the offset while the left and
-        while the right foot stands; (a, -a) with positive a, away from the stance foot, is pumping,
-        which can drive the walker on the level and uphill.
+        Of a ``Walker`` only. One number: an offset that the slope can balance, sin(heading) = -offset / tan(slope), gives a gait across the
+        slope. A pair: the offset while the left and while the right foot stands; (a, -a) with positive a, away from the stance foot, is
+        pumping, which can drive the walker on the level and uphill.
 
     Raises
     ------
@@ -193,29 +217,27 @@ def find_limit_cycle(
     ValueError
         If an argument is outside its range.
     """
-    section_map = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
+    section_map = section_map_of(walker, **command)
     return cycle_at(section_map, next(section_map.search()))
 
 
-def find_gait(
-    walker: Walker,
-    *,
-    inter_leg_angle: float = INTER_LEG_ANGLE,
-    mass_offset: float | tuple[float, float] = 0.0,
-) -> Vector:
+def find_gait(walker: Walker, **command: Unpack[CommandArguments]) -> Vector:
     """The section state of ``find_limit_cycle`` alone, on the left foot, to the same residual.
 
-    The root finder estimates its own slopes here, so that nothing but the step itself is compiled.
+    The root finder estimates its own slopes here, so that nothing but the step itself is compiled; where that fails, it gets the Jacobian.
 
     Raises
     ------
     NoGaitError, ValueError
         As ``find_limit_cycle``.
     """
-    section_map = section_map_of(walker, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset)
+    section_map = section_map_of(walker, **command)
     if not isinstance(section_map, ActiveMap):
         raise ValueError(f"walker must be a Walker, got {walker!r}")
-    return search_active(section_map, exact=False)
+    try:
+        return search_active(section_map, exact=False)
+    except NoGaitError:
+        return search_active(section_map, exact=True)
 
 
 def find_passive_gaits(walker: PassiveWalker) -> tuple[LimitCycle, ...]:
@@ -231,33 +253,87 @@ def find_passive_gaits(walker: PassiveWalker) -> tuple[LimitCycle, ...]:
     """
     if not isinstance(walker, PassiveWalker):
         raise ValueError(f"walker must be a PassiveWalker, got {walker!r}")
-    section_map = section_map_of(walker)
+    section_map = PassiveMap(walker)
     cycles = [cycle_at(section_map, state) for state in section_map.search()]
     return tuple(sorted(cycles, key=lambda cycle: -cycle.stride_period))
 
 
 def cycle_at(section_map: SectionMap, state: Vector) -> LimitCycle:
-    """Describe the gait at a fixed point of a section map.
-
-    Parameters
-    ----------
-    section_map : SectionMap
-    state : shape (k,)
-        Its fixed point, as from ``solve_fixed_point``.
-    """
+    """Describe the gait at a fixed point (k,) of a section map, as from ``solve_fixed_point``."""
     n_steps = section_map.n_steps
     cycle = section_map.over(2 * n_steps) if n_steps % 2 else section_map
     free = cycle.free
     linear = cycle.linearise(state)
     steps = cycle.results(state)
     change = steps[-1].state - state
+    turn = 0.0 if 0 in free else float(change[0])
+    of_steps = {name: np.array([getattr(step, name) for step in steps]) for name in OF_STEPS}
+    numbers = numbers_of_cycles(of_steps, np.array(turn))
     return LimitCycle(
         state=state,
-        turn=0.0 if 0 in free else float(change[0]),
+        turn=turn,
         residual=float(np.abs(change[free]).max()),
         jacobian=linear.matrix[np.ix_(free, free)],
         jacobian_error=linear.error[np.ix_(free, free)],
         coordinates=tuple(cycle.names[i] for i in free),
         steps=tuple(steps),
         section_map=section_map,
+        **{name: float(number) for name, number in numbers.items()},
     )
+
+
+def find_periodic_gait(
+    walker: WalkerOrMap, *, n_steps: int, **command: Unpack[CommandArguments]
+) -> LimitCycle:
+    """Find a gait that repeats after exactly ``n_steps`` steps, and not after half of them.
+
+    The walk is started a little off the unstable simple gait, along its most unstable mode, left to
+    settle, and the cycle it settles to is solved for. So only cycles that attract are found.
+
+    Parameters
+    ----------
+    walker : Walker, PassiveWalker or SectionMap
+    n_steps : even int in [2, 64]
+        Steps of one leg: 2 is a gait that limps, 4 its doubling.
+    inter_leg_angle, mass_offset : see ``find_limit_cycle``
+
+    Raises
+    ------
+    NoGaitError
+        If the walk settles to no such cycle; says what it did.
+    ValueError
+        If an argument is outside its range.
+    """
+    if require_count("n_steps", n_steps, 2, 64) % 2:
+        raise ValueError(f"n_steps must be even, got {n_steps!r}")
+    single = section_map_of(walker, **command)
+    gait, cycle, free = find_limit_cycle(single).state, single.over(n_steps), single.free
+    values, vectors = np.linalg.eig(single.derivative(gait)[1][np.ix_(free, free)])
+    unstable = np.real(vectors[:, np.argmax(np.abs(values))])
+    way = np.zeros(gait.size)
+    way[free] = np.linalg.norm(gait) * unstable / np.linalg.norm(unstable)
+    reasons: list[str] = []
+    for kick in _KICKS:
+        try:
+            state = solve_fixed_point(cycle, _settled(cycle, gait + kick * way))
+            if n_steps // 2 >= single.n_steps:
+                half = single.over(n_steps // 2)
+                change = np.abs(half.image(state) - state)[free].max()
+                if change < max(_DIFFERENT, 10.0 * cycle.precision):
+                    raise NoGaitError(
+                        f"the walk settled to a gait of {half.n_steps} steps or fewer"
+                    )
+        except (LeanYawError, ValueError) as error:
+            reasons.append(f"kicked by {kick:g}: {error}")
+            continue
+        return cycle_at(cycle, state)
+    raise NoGaitError(f"no gait of {n_steps} steps found; " + "; ".join(reasons))
+
+
+def _settled(cycle: SectionMap, state: Vector) -> Vector:
+    """Where the walk is once the state recurs, or after as long as is bearable."""
+    for _ in range(_SETTLING):
+        before, state = state, cycle.image(state)
+        if float(np.abs(state - before)[cycle.free].max()) < max(_RECURS, cycle.precision):
+            break
+    return state

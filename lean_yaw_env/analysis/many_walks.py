@@ -63,15 +63,17 @@ class ManyWalks:
         return self
 
 
-def walk_many(section_map: SectionMap, states: Vector, n_steps: int) -> ManyWalks:
-    """Walk ``n_steps`` from each state, left foot first.
+def walk_many(
+    section_map: SectionMap,
+    states: Vector,
+    n_steps: int,
+    *,
+    foot: int = 0,
+    carried: Vector | None = None,
+) -> ManyWalks:
+    """Walk ``n_steps`` from each of states (n, k) on the left (0) or right (1) foot; how many steps the map itself takes plays no part.
 
-    Parameters
-    ----------
-    section_map : SectionMap
-        How many steps it takes itself plays no part.
-    states : shape (n, k)
-    n_steps : int >= 1
+    ``carried`` (n,) is what the first step finds of an earlier one, by default the map's.
 
     Raises
     ------
@@ -82,29 +84,17 @@ def walk_many(section_map: SectionMap, states: Vector, n_steps: int) -> ManyWalk
     current = np.array(states, dtype=float)
     steps, endings = np.zeros(len(current), dtype=np.int64), np.zeros(len(current))
     for first in range(0, len(current), _CHUNK):
-        part = slice(first, first + _CHUNK)
-        _walk(section_map, current[part], steps[part], endings[part], n_steps)
+        walking = np.arange(first, min(first + _CHUNK, len(current)))
+        found = np.full(walking.size, section_map.carried) if carried is None else carried[walking]
+        for k in range(n_steps):
+            if not walking.size:
+                break
+            after, found, status = section_map.step_many(current[walking], found, (foot + k) % 2)
+            done = status == records.STEPPED
+            # the integrator's failure leaves nothing that means anything
+            known = status != records.FAILED
+            current[walking[known]] = after[known]
+            steps[walking[done]] += 1
+            endings[walking[~done]] = status[~done]
+            walking, found = walking[done], found[done]
     return ManyWalks(steps, endings, current)
-
-
-def _walk(
-    section_map: SectionMap,
-    states: Vector,
-    steps: NDArray[np.int64],
-    endings: Vector,
-    n_steps: int,
-) -> None:
-    """Walk from states, which are overwritten by the last ones."""
-    walking = np.arange(len(states))
-    carried = np.full(len(states), section_map.carried)
-    for k in range(n_steps):
-        if not walking.size:
-            break
-        after, handed_on, status = section_map.step_many(states[walking], carried, k % 2)
-        done = status == records.STEPPED
-        # the integrator's failure leaves nothing that means anything
-        known = status != records.FAILED
-        states[walking[known]] = after[known]
-        steps[walking[done]] += 1
-        endings[walking[~done]] = status[~done]
-        walking, carried = walking[done], handed_on[done]

@@ -10,14 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lean_yaw_env.analysis.fixed_point import (
-    follow_fixed_point,
-    side_of_folds,
-    solve_fixed_point,
-)
+from lean_yaw_env.analysis.fixed_point import follow_fixed_point, side_of_folds, solve_fixed_point
 from lean_yaw_env.analysis.section_map import (
     BODY_PARAMETERS,
     FEET_IN_TURN,
+    CommandArguments,
     CycleStep,
     Linearised,
     SectionMap,
@@ -38,16 +35,14 @@ from lean_yaw_env.passive import (
     require_passive_state,
     step_passive_rows,
 )
-from lean_yaw_env.validation import require_choice, require_count
+from lean_yaw_env.validation import require_choice, require_count, require_instance
 from lean_yaw_env.walker import SIDE, Walker, raise_for_failure
 
 if TYPE_CHECKING:
-    pass
+    from typing_extensions import Unpack
 
-# Stance pitch over the scaling law's, and rate over pitch: 0.94 to 1.16 and 0.79 to 1.05 in the
-# gaits of point feet and of radius 0.5; other radii in between and somewhat beyond.
-_PITCHES = np.linspace(0.85, 1.35, 11)
-_RATES = np.linspace(0.7, 1.1, 17)
+_PITCHES, _RATES = np.linspace(0.85, 1.35, 11), np.linspace(0.7, 1.1, 17)
+"""Stance pitch over the scaling law's, and rate over pitch: 0.94 to 1.16 and 0.79 to 1.05 in the gaits of point feet and of radius 0.5."""
 _SAME_GAIT = 1e-7
 _LEAST_PITCH = 1e-3
 """A smaller step is the solution of not walking at all."""
@@ -71,12 +66,12 @@ class PassiveMap(SectionMap):
     mirror = PASSIVE_MIRROR
     carried = float("nan")  # the first step's swing leg starts where it is on the floor
     zero_explanation = (
-        "swing rate: the swing foot's mass acts on nothing, and at heel strike the new swing "
-        "foot's momentum follows from the stance leg's pose and rates, so that the state after "
-        "a strike has one freedom less than the section"
+        "swing rate: the swing foot's mass acts on nothing, and at heel strike the new swing foot's momentum follows from the stance leg's "
+        "pose and rates, so that the state after a strike has one freedom less than the section"
     )
 
     def __post_init__(self) -> None:
+        require_instance("walker", self.walker, PassiveWalker)
         require_count("n_steps", self.n_steps)
 
     @property
@@ -101,27 +96,17 @@ class PassiveMap(SectionMap):
             result = self.walker.step(state, stance=foot, inter_leg_angle=angle)
             if result.fall is not None:
                 raise FellError(f"the walker fell {result.fall.value} in step {k + 1} of the gait")
-            steps.append(
-                CycleStep(
-                    start=state,
-                    state=result.state,
-                    foot=foot,
-                    command=_NO_COMMAND,
-                    duration=result.duration,
-                    displacement=result.displacement,
-                    least_normal_force=result.least_normal_force,
-                    greatest_friction=result.greatest_friction,
-                    gravity_work=result.gravity_work,
-                    shift_work=0.0,
-                )
-            )
+            steps.append(CycleStep(
+                start=state, state=result.state, foot=foot, command=_NO_COMMAND, duration=result.duration, displacement=result.displacement,
+                least_normal_force=result.least_normal_force, greatest_friction=result.greatest_friction,
+                gravity_work=result.energy.gravity_work, shift_work=0.0,
+            ))  # fmt: skip
             state, angle = result.state, result.inter_leg_angle
         return steps
 
     def linear_step(self, state: Vector, k: int, parameter: str | None) -> Linearised:
-        size = PASSIVE_STATE_SIZE
+        size, side = PASSIVE_STATE_SIZE, SIDE[FEET_IN_TURN[k % 2]]
         rows, after = np.empty((size, INPUTS)), np.empty(size)
-        side = SIDE[FEET_IN_TURN[k % 2]]
         status = passive_jacobian(self._body, state, side, after, rows)
         raise_for_failure(status, self._body, (np.nan,), state, side)
         if status != STEPPED:
@@ -145,7 +130,7 @@ class PassiveMap(SectionMap):
         """Section states of the symmetric gaits that were found, that of the longest period first."""
         found, reasons = False, set[str]()
         try:
-            planar = planar_gaits(_planar_parameters(self.walker.parameters))
+            planar = self._planar_gaits()
         except NoGaitError as error:
             planar = ()
             reasons.add(str(error))
@@ -159,12 +144,13 @@ class PassiveMap(SectionMap):
             raise NoGaitError(
                 f"no gait found for the passive walker of {self.walker.parameters}; tried: "
                 f"{_PITCHES.size * _RATES.size} planar starts, following each gait from no hip "
-                f"width; reasons: {'; '.join(sorted(reasons))}"
+                f"width; reasons: {'; '.join(sorted(reasons))}. Try a positive slope that is gentle (below 0.05), "
+                "hips narrower than 0.1, or an ankle tilt near 0.15"
             )
 
-    def long_gait(self) -> Vector:
+    def main_gait(self) -> Vector:
         """The section state of the gait that the planar one of the longest period leads to, or ``NoGaitError``."""
-        return self._widened(planar_gaits(_planar_parameters(self.walker.parameters))[0])
+        return self._widened(self._planar_gaits()[0])
 
     def question(self) -> dict[str, Any]:
         return {**super().question(), "planar": self.walker.planar}
@@ -172,6 +158,12 @@ class PassiveMap(SectionMap):
     @cached_property
     def _body(self):
         return self.walker.moving_parameters.body()
+
+    def _planar_gaits(self) -> tuple[Vector, ...]:
+        """``planar_gaits`` of the walker, which depend on these parameters only."""
+        names = ("foot_radius", "slope", "friction_limit", "max_step_duration")
+        kept = {name: getattr(self.walker.parameters, name) for name in names}
+        return planar_gaits(WalkerParameters(hip_width=0.0, **kept))
 
     def _widened(self, state: Vector) -> Vector:
         """Follow a planar gait to the walker's hip width."""
@@ -182,29 +174,13 @@ class PassiveMap(SectionMap):
         def path(share: float) -> PassiveMap:
             return PassiveMap(self.walker).moved("hip_width", share * width)
 
-        return follow_fixed_point(path, state, side=side_of_folds(path(0.0), state))[1]
+        return follow_fixed_point(path, state, side=side_of_folds(path(0.0), state))
 
 
-@section_map_of.register
-def _(
-    walker: PassiveWalker,
-    *,
-    inter_leg_angle: float = INTER_LEG_ANGLE,
-    mass_offset: float | tuple[float, float] = 0.0,
-) -> PassiveMap:
-    require_no_command("a passive walker", inter_leg_angle, mass_offset)
+@section_map_of.register(PassiveWalker)
+def _(walker: PassiveWalker, **command: Unpack[CommandArguments]) -> PassiveMap:
+    require_no_command("a passive walker", **command)
     return PassiveMap(walker)
-
-
-def _planar_parameters(parameters: WalkerParameters) -> WalkerParameters:
-    """The parameters that a planar gait depends on, the others at their defaults."""
-    return WalkerParameters(
-        hip_width=0.0,
-        foot_radius=parameters.foot_radius,
-        slope=parameters.slope,
-        friction_limit=parameters.friction_limit,
-        max_step_duration=parameters.max_step_duration,
-    )
 
 
 @lru_cache(maxsize=4096)
@@ -232,9 +208,7 @@ def planar_gaits(parameters: WalkerParameters) -> tuple[Vector, ...]:
         if is_new and state[1] > _LEAST_PITCH and duration < _LONGEST_STEP:
             found.append((duration, state))
     if not found:
-        raise NoGaitError(
-            "; ".join(sorted(reasons)[:4]) if reasons else "the slope gives no energy"
-        )
+        raise NoGaitError("; ".join(sorted(reasons)[:4]) or "the slope gives no energy")
     return tuple(state for _, state in sorted(found, key=lambda pair: -pair[0]))
 
 
@@ -247,7 +221,7 @@ def _planar_starts(parameters: WalkerParameters) -> list[Vector]:
     starts = []
     for pitch in scale * _PITCHES:
         for rate in -pitch * _RATES:
-            # Momentum kept by the trailing foot: exact for point feet, halved for radius 0.5
+            # momentum kept by the trailing foot: exact for point feet, halved for radius 0.5
             swing = -(1.0 - radius) * rate * (1.0 - np.cos(2.0 * pitch))
             starts.append(np.array([0.0, pitch, 0.0, rate, 0.0, swing]))
     return starts

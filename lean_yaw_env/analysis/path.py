@@ -16,20 +16,10 @@ _AN_INSTANT = 1e-6
 
 
 def distance_walked(displacements: ArrayLike, turn: ArrayLike = 0.0) -> NDArray[np.float64]:
-    """Distance walked in a cycle: from each footprint to the same foot's next one, the mean of both feet.
+    """Distances (...) walked in cycles: from each footprint to the same foot's next one, the mean of both feet.
 
+    ``displacements`` (..., n, 2) are those of a cycle's n steps, n even, each downhill and to the right; ``turn`` (...) is the heading gained.
     In a turn the outer foot walks farther than the inner one.
-
-    Parameters
-    ----------
-    displacements : shape (..., n, 2)
-        Of the cycle's n steps, n even, each downhill and to the right.
-    turn : shape (...)
-        Heading gained over the cycle, rad.
-
-    Returns
-    -------
-    shape (...)
     """
     steps = np.asarray(displacements, dtype=float)
     following = np.concatenate([steps[..., 1:, :], rotated(steps[..., :1, :], turn)], axis=-2)
@@ -61,16 +51,8 @@ def axle_middle(walker: Walker, state: Vector, foot: Foot) -> Vector:
 def turning_radius(middles: Vector, displacement: Vector, turn: float) -> float:
     """Radius of the circle on which the middle of the hip axle walks; infinite if the gait does not turn.
 
-    Every cycle moves the walker about the same centre. The radius is the root mean square distance from it at the heel strikes.
-
-    Parameters
-    ----------
-    middles : shape (n, 2)
-        Places of the axle's middle at the n heel strikes of a cycle, seen from the first contact reference point.
-    displacement : shape (2,)
-        Of the contact reference point over the cycle.
-    turn : float
-        Heading gained over the cycle, rad.
+    Every cycle moves the walker about the same centre. The radius is the root mean square distance from it at the heel strikes: of ``middles``
+    (n, 2), seen from the first contact reference point, which moves by ``displacement`` (2,) over the cycle and turns by ``turn``.
     """
     if abs(turn) < _STRAIGHT:
         return math.inf

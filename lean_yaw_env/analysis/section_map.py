@@ -1,10 +1,8 @@
 """What every analysis asks of a walker: a map from one heel strike to a later one.
 
-A map takes a number of walking steps and, after an odd number, the mirror image, so that every state
-stands on the left foot. A symmetric gait is a fixed point of one mirrored step. A gait that limps, or
-walks across the slope, is one of two steps. Root finding, modes, basins of attraction, continuation
-and the floor's demands use nothing else of a walker. So they work on every kind of map: a walker at a
-constant command, a passive walker, and a walker that a controller steers.
+A map takes a number of walking steps and, after an odd number, the mirror image, so that every state stands on the left foot. A symmetric
+gait is a fixed point of one mirrored step. A gait that limps, or walks across the slope, is one of two steps. The analyses use nothing
+else of a walker. So they work on every kind of map: a walker at a constant command, a passive walker, and a walker that a controller steers.
 """
 
 from __future__ import annotations
@@ -13,39 +11,29 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from functools import singledispatch
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, TypeAlias, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lean_yaw_env.kernel.records import Command
+from lean_yaw_env.kernel.records import BODY_INPUTS, Command
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector, require_mass_offset
 from lean_yaw_env.passive import PassiveWalker
 from lean_yaw_env.validation import require_choice
 from lean_yaw_env.walker import Walker
 
 if TYPE_CHECKING:
-    from typing_extensions import Self
+    from typing_extensions import Self, Unpack
 
 RESIDUAL_LIMIT = 1e-12
 """Largest change of any coordinate over an exact map that still counts as a fixed point."""
 
-BODY_PARAMETERS = (
-    "hip_width",
-    "foot_radius",
-    "ankle_tilt",
-    "slope",
-    "ankle_stiffness",
-    "ankle_damping",
-)
+BODY_PARAMETERS = BODY_INPUTS
 """Parameters of any walker by which a step is differentiable."""
-
 FEET_IN_TURN: tuple[Foot, Foot] = ("left", "right")
 """The stance feet of the steps of a map, by turns."""
-
 Motion = Literal["heading", "lean", "pitch", "masses"]
 """What a coordinate of a state belongs to; "pitch" is the fore-aft motion of stance leg and swing leg."""
-
 MOTIONS: dict[str, Motion] = {
     "heading": "heading",
     "stance_pitch": "pitch",
@@ -92,10 +80,9 @@ class CycleStep:
 
 
 class Linearised(NamedTuple):
-    """A map, or one of its steps, with its derivatives at a state.
+    """A map, or one of its steps, at a state: ``image`` (k,), ``matrix`` (k, k) by the state, ``by_parameter`` (k,), and ``error`` (k, k).
 
-    ``image`` (k,), ``matrix`` (k, k) by the state, ``by_parameter`` (k,), and ``error`` (k, k), a bound of the error of ``matrix``; it is zero
-    where derivatives are exact.
+    The error is a bound of that of ``matrix``, zero where derivatives are exact.
     """
 
     image: Vector
@@ -175,40 +162,30 @@ class SectionMap(ABC):
 
     @abstractmethod
     def linear_step(self, state: Vector, k: int, parameter: str | None) -> Linearised:
-        """Step ``k`` of the map with its derivatives, not mirrored; those by a parameter are zero if none is named.
-
-        Raises
-        ------
-        FellError, SolverError
-            As ``results``.
-        """
+        """Step ``k`` with its derivatives, not mirrored; those by a parameter are zero if none is named. Raises as ``results``."""
 
     @abstractmethod
     def step_many(
         self, states: Vector, carried: Vector, foot: int
     ) -> tuple[Vector, Vector, Vector]:
-        """One step of n walkers on the left (0) or right (1) foot.
+        """One step of n walkers on the left (0) or right (1) foot, from states (n, k) and what they carry (n,).
 
-        Parameters
-        ----------
-        states : shape (n, k)
-        carried : shape (n,)
-        foot : 0 or 1
-
-        Returns
-        -------
-        states (n, k), carried (n,) and statuses (n,) of ``kernel.records``
+        Returns states (n, k), what is carried on (n,) and the statuses (n,) of ``kernel.records``.
         """
+
+    def step_commanded(
+        self, states: Vector, carried: Vector, commands: Vector, foot: int
+    ) -> tuple[Vector, Vector, Vector]:
+        """``step_many`` at inter-leg angles and mass offsets (n, 2) of one's own choice, or ``ValueError`` where the walker takes none."""
+        raise ValueError(f"a walker that takes commands is needed, got {self.walker!r}")
 
     @abstractmethod
     def search(self) -> Iterator[Vector]:
-        """States of the gaits that the map is known to have, the best first.
+        """States of the gaits that the map is known to have, the best first, or ``NoGaitError`` saying what was tried."""
 
-        Raises
-        ------
-        NoGaitError
-            If there is none; says what was tried.
-        """
+    def main_gait(self) -> Vector:
+        """State of the gait that a map over parameters shows, or ``NoGaitError``."""
+        return next(self.search())
 
     def value(self, parameter: str) -> float:
         """A parameter's value, or ``ValueError`` for an unknown one."""
@@ -230,6 +207,7 @@ class SectionMap(ABC):
 
     def along(self, parameter: str) -> Self:
         """The map over as many steps as its gaits repeat in at every value of a parameter."""
+        require_choice("parameter", parameter, self.parameters)
         return self
 
     def question(self) -> dict[str, Any]:
@@ -242,19 +220,10 @@ class SectionMap(ABC):
         return self.mirror * end if self.n_steps % 2 else end
 
     def linearise(self, state: Vector, parameter: str | None = None) -> Linearised:
-        """The map with its derivatives by the state and, if one is named, by a parameter.
-
-        Raises
-        ------
-        FellError, SolverError
-            As ``results``.
-        ValueError
-            If the state is outside its range, or the parameter is unknown.
-        """
+        """The map with its derivatives by the state and, if one is named, by a parameter. Raises as ``results``."""
         state = self.require_state(state)
         size = len(state)
-        matrix, by_parameter = np.eye(size), np.zeros(size)
-        error = np.zeros((size, size))
+        matrix, by_parameter, error = np.eye(size), np.zeros(size), np.zeros((size, size))
         for k in range(self.n_steps):
             step = self.linear_step(state, k, parameter)
             by_parameter = step.matrix @ by_parameter + step.by_parameter
@@ -275,23 +244,20 @@ class SectionMap(ABC):
         return self.linearise(state, parameter)[:3]
 
 
-@singledispatch
-def section_map_of(
-    walker: Any,
-    *,
-    inter_leg_angle: float = INTER_LEG_ANGLE,
-    mass_offset: float | tuple[float, float] = 0.0,
-) -> SectionMap:
-    """A walker's section map over the fewest steps that a simple gait repeats in.
+WalkerOrMap: TypeAlias = "Walker | PassiveWalker | SectionMap"
+"""What the analyses take: a walker, or any map, which holds its own command."""
 
-    Parameters
-    ----------
-    walker : Walker, PassiveWalker or SectionMap
-        A map is returned as it is.
-    inter_leg_angle : (0, pi/2)
-        Of a ``Walker`` only.
-    mass_offset : [-1, 1], or a pair of them (left foot's, right foot's)
-        Of a ``Walker`` only.
+
+class CommandArguments(TypedDict, total=False):
+    """Keywords of every analysis of an active ``Walker`` at a constant command; see ``find_limit_cycle``."""
+
+    inter_leg_angle: float
+    mass_offset: float | tuple[float, float]
+
+
+@singledispatch
+def section_map_of(walker: Any, **command: Unpack[CommandArguments]) -> SectionMap:
+    """A walker's section map over the fewest steps that a simple gait repeats in; a map is returned as it is.
 
     Raises
     ------
@@ -301,35 +267,32 @@ def section_map_of(
     raise ValueError(f"walker must be a Walker, a PassiveWalker or a SectionMap, got {walker!r}")
 
 
-@section_map_of.register
-def _(
-    walker: SectionMap,
-    *,
-    inter_leg_angle: float = INTER_LEG_ANGLE,
-    mass_offset: float | tuple[float, float] = 0.0,
-) -> SectionMap:
-    require_no_command("a map, which holds its own command,", inter_leg_angle, mass_offset)
+@section_map_of.register(SectionMap)
+def _(walker: SectionMap, **command: Unpack[CommandArguments]) -> SectionMap:
+    require_no_command("a map, which holds its own command,", **command)
     return walker
 
 
 def require_offsets(mass_offset: float | tuple[float, float]) -> tuple[float, float]:
     """Offsets in force while the left and while the right foot stands, or ``ValueError``."""
-    if isinstance(mass_offset, (tuple, list, np.ndarray)):
-        if len(mass_offset) != 2:
-            raise ValueError(
-                f"mass_offset must be a number or a pair (left foot's, right foot's), "
-                f"got {mass_offset!r}"
-            )
-        left, right = mass_offset
-        return require_mass_offset(left, "left mass_offset"), require_mass_offset(
-            right, "right mass_offset"
+    if not isinstance(mass_offset, (tuple, list, np.ndarray)):
+        both = require_mass_offset(mass_offset)
+        return both, both
+    if len(mass_offset) != 2:
+        raise ValueError(
+            f"mass_offset must be a number or a pair (left foot's, right foot's), got {mass_offset!r}"
         )
-    both = require_mass_offset(mass_offset)
-    return both, both
+    left, right = mass_offset
+    return (
+        require_mass_offset(left, "left mass_offset"), require_mass_offset(right, "right mass_offset")
+    )  # fmt: skip
 
 
 def require_no_command(
-    what: str, inter_leg_angle: float, mass_offset: float | tuple[float, float]
+    what: str,
+    *,
+    inter_leg_angle: float = INTER_LEG_ANGLE,
+    mass_offset: float | tuple[float, float] = 0.0,
 ) -> None:
     """Raise ``ValueError`` if a command is given."""
     if inter_leg_angle != INTER_LEG_ANGLE or require_offsets(mass_offset) != (0.0, 0.0):

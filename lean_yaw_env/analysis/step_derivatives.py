@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
@@ -16,17 +16,10 @@ BY_STATE, BY_COMMAND, BY_BODY = STATE_SIZE, STATE_SIZE + len(Command._fields), l
 """Numbers of inputs by which a step is differentiated."""
 
 
-@dataclass(frozen=True)
-class StepDerivatives:
-    """One walking step with its exact derivatives.
+class StepDerivatives(NamedTuple):
+    """``kernel.jacobian.OUTPUTS`` (10,) of one walking step, and their derivatives (10, inputs) by the first of ``kernel.jacobian.INPUTS``.
 
-    Attributes
-    ----------
-    outputs : shape (10,)
-        What comes out of the step, in the order of ``kernel.jacobian.OUTPUTS``.
-    jacobian : shape (10, inputs)
-        Its derivatives by the first of ``kernel.jacobian.INPUTS``: the section state, the inter-leg angle, the mass offset, the offset before,
-        then ``BODY_PARAMETERS``.
+    Those are the section state, the inter-leg angle, the mass offset, the offset before, then ``BODY_PARAMETERS``.
     """
 
     outputs: Vector
@@ -70,8 +63,7 @@ def differentiate_step(
     SolverError
         If the integrator fails.
     """
-    start = require_state(state)
-    body = walker.parameters.body()
+    start, body = require_state(state), walker.parameters.body()
     status, outputs, rows = step_jacobian(body, command, start, SIDE[stance], inputs)
     raise_for_failure(status, body, command, start, SIDE[stance])
     if status in FALL_OF_STATUS:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+import numpy as np
 import typer
 
-from lean_yaw_env.cli import rows, screen
-from lean_yaw_env.cli.axes import parse_axes, parse_range
-from lean_yaw_env.cli.commands import Output, add_command
+from lean_yaw_env.cli import plots, records
+from lean_yaw_env.cli.commands import Output, add_command, parse_axes, parse_range
+from lean_yaw_env.parameters import Vector
 from lean_yaw_env.passive import PassiveWalker
 from lean_yaw_env.walker import Walker
 
@@ -36,10 +38,14 @@ MassOffset = Annotated[
 Out = Annotated[
     Path | None, typer.Option(help="Keep the whole result in this netCDF file; resumes from it.")
 ]
+_MANY_POINTS = 10_000
+"""A map of more points says beforehand what it costs."""
+_RECORD = 2_000.0
+"""Bytes of a point among what is printed."""
 Speeds = Annotated[str, typer.Option(help="Speeds in m/s: a number or low:high:count.")]
 
 
-@command()
+@command(draws=True)
 def gait(
     walker: Walker | PassiveWalker,
     inter_leg_angle: InterLegAngle = 0.3,
@@ -56,11 +62,11 @@ def gait(
 
     offsets = mass_offset + alternating_offset, mass_offset - alternating_offset
     cycle = find_limit_cycle(walker, inter_leg_angle=inter_leg_angle, mass_offset=offsets)
-    record = rows.gait_record(cycle)
-    return Output(record, lambda: screen.show_gait(record))
+    record = records.gait_record(cycle)
+    return Output(record, lambda: records.show_gait(record), lambda: plots.gait_figure(cycle))
 
 
-@command("map")
+@command("map", draws=True)
 def stability(
     walker: Walker | PassiveWalker,
     axis: Annotated[
@@ -77,9 +83,21 @@ def stability(
     out: Out = None,
 ) -> Output:
     """Find the gait and its stability at every point of a grid of parameters."""
-    from lean_yaw_env.analysis import stability_map
+    from lean_yaw_env.analysis import map_cost, stability_map
+    from lean_yaw_env.analysis.storage import require_memory
 
     axes = parse_axes(axis)
+    points = math.prod(values.size for values in axes.values())
+    if points > _MANY_POINTS:
+        require_memory("axes", points, _RECORD)
+        size, seconds = map_cost(
+            walker, axes, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset
+        )
+        size += points * _RECORD
+        typer.echo(
+            f"{points:,} points: about {size / 1e9:.2g} GB of memory and {seconds / 60.0 / threads:.2g} minutes",
+            err=True,
+        )
     data = stability_map(
         walker,
         axes,
@@ -89,10 +107,16 @@ def stability(
         threads=threads,
         progress=sys.stderr.isatty(),
     )
-    return _counted(rows.map_records(data, axes), "gait", "points")
+    points = records.map_records(data)
+    numbers = ("speed", "spectral_radius")
+    return Output(
+        {"counts": records.count_by(points, "gait"), "points": points},
+        lambda: records.show_grid("points", "gait", points, numbers),
+        lambda: plots.map_figure(data),
+    )
 
 
-@command()
+@command(draws=True)
 def basin(
     walker: Walker | PassiveWalker,
     x: Annotated[str, typer.Argument(help="Coordinate of the section as name=low:high:count.")],
@@ -105,8 +129,7 @@ def basin(
     """Walk from every point of a plane of the section through the gait: what it survives."""
     from lean_yaw_env.analysis import basin as basin_of
 
-    axes = parse_axes([x, y])
-    first, second = axes.items()
+    first, second = parse_axes([x, y]).items()
     data = basin_of(
         walker,
         first,
@@ -117,36 +140,83 @@ def basin(
         path=out,
         progress=sys.stderr.isatty(),
     )
-    return _counted(rows.basin_records(data, axes), "ending", "starts")
+    starts = records.basin_records(data)
+    return Output(
+        {"counts": records.count_by(starts, "ending"), "starts": starts},
+        lambda: records.show_grid("starts", "ending", starts, ("steps",)),
+        lambda: plots.basin_figure(data),
+    )
 
 
-def _counted(records: list[rows.Record], key: str, title: str) -> Output:
-    """Records, and how many have each value of a key."""
-    counts = rows.count_by(records, key)
-
-    def show() -> None:
-        screen.show_pairs(f"{key}s", counts)
-        screen.show_records(title, records)
-
-    return Output({"counts": counts, title: records}, show)
-
-
-@command()
+@command(draws=True)
 def bicycle(
     speeds: Speeds = "0:10:11",
     benchmark: Annotated[
         bool,
         typer.Option("--benchmark", help="The 2007 benchmark bicycle instead of the paper's."),
     ] = False,
+    parameters: Annotated[
+        Path | None,
+        typer.Option(
+            help="JSON file of your bicycle's parameters, by the names of BicycleParameters; those it "
+            "does not give are the benchmark's."
+        ),
+    ] = None,
 ) -> Output:
     """Eigenvalues of the uncontrolled bicycle by mode, and the speeds that matter."""
-    from lean_yaw_env.vehicles import benchmark_bicycle, paper_bicycle
+    from lean_yaw_env.files import read_json
+    from lean_yaw_env.vehicles import (
+        BENCHMARK_2007,
+        benchmark_bicycle,
+        follow_eigenvalues,
+        paper_bicycle,
+    )
 
-    vehicle = benchmark_bicycle() if benchmark else paper_bicycle()
-    return _vehicle(rows.bicycle_record(vehicle, parse_range(speeds, "speeds")))
+    if benchmark and parameters is not None:
+        raise ValueError("give --benchmark or --parameters, not both")
+    given = read_json(parameters) if parameters is not None else {}
+    vehicle = benchmark_bicycle(changed(BENCHMARK_2007, given, str(parameters)))
+    if not benchmark and parameters is None:
+        vehicle = paper_bicycle()
+    grid = parse_range(speeds, "speeds")
+    record = records.bicycle_record(vehicle, follow_eigenvalues(vehicle, grid))
+
+    def figure() -> Any:
+        fine = follow_eigenvalues(vehicle, finer(grid))
+        stable = record["stable_speeds"]
+        return plots.eigenvalue_figure(fine.speeds, fine.names, fine.eigenvalues, stable)
+
+    return _vehicle(record, figure)
 
 
-@command()
+def changed(value: Any, changes: Any, place: str) -> Any:
+    """A dataclass with some fields changed, those that are dataclasses themselves in the same way.
+
+    Parameters
+    ----------
+    value : dataclass
+    changes : mapping of names to values
+    place : str
+        Where the changes are from, for the error.
+
+    Raises
+    ------
+    ValueError
+        If ``changes`` is no mapping or a field has another name; from the dataclass, if a value is outside its range.
+    """
+    if not isinstance(changes, dict):
+        raise ValueError(f"{place} must be an object of names and values, got {changes!r}")
+    names = [field.name for field in fields(value)]
+    new = {}
+    for name, change in changes.items():
+        if name not in names:
+            raise ValueError(f"{place} has the name {name!r}, which is none of {', '.join(names)}")
+        old = getattr(value, name)
+        new[name] = changed(old, change, f"{name} of {place}") if is_dataclass(old) else change
+    return replace(value, **new)
+
+
+@command(draws=True)
 def skateboard(
     mass: Annotated[float, typer.Option(help="Of the rider, kg.")] = 70.0,
     rider_height: Annotated[float, typer.Option(help="Of the rider's centre of mass, m.")] = 1.0,
@@ -160,22 +230,53 @@ def skateboard(
     speeds: Speeds = "0:4:9",
 ) -> Output:
     """Critical speed and eigenvalues of the skateboard with a stiff rider."""
-    from lean_yaw_env.vehicles import Skateboard
+    from lean_yaw_env.vehicles import Skateboard, stable_speed_range
 
     board = Skateboard(
         mass, rider_height, wheelbase, steering_tilt, spring_stiffness, gravity, damping
     )
-    return _vehicle(rows.skateboard_record(board, parse_range(speeds, "speeds")))
+    grid = parse_range(speeds, "speeds")
+    values, stable = board.eigenvalues(finer(grid)), stable_speed_range(board)
+    return _vehicle(
+        records.skateboard_record(board, grid),
+        lambda: plots.eigenvalue_figure(finer(grid), ("first", "second"), values, stable),
+    )
 
 
-def _vehicle(record: rows.Record) -> Output:
+def finer(speeds: Vector) -> Vector:
+    """Speeds over the same range, close enough for a picture."""
+    return np.union1d(speeds, np.linspace(speeds[0], speeds[-1], 501))
+
+
+def _vehicle(record: records.Record, figure: Any) -> Output:
     """A vehicle's special speeds and its eigenvalues."""
 
     def show() -> None:
-        screen.show_pairs("speeds, m/s", record)
-        screen.show_records("eigenvalues, 1/s", record["eigenvalues"])
+        records.show_pairs("speeds, m/s", record)
+        records.show_records("eigenvalues, 1/s", record["eigenvalues"])
 
-    return Output(record, show)
+    return Output(record, show, figure)
+
+
+@command()
+def play(
+    env_id: Annotated[str, typer.Argument(help="An environment, such as LeanYaw/Heading-v0.")],
+    speed: Annotated[float, typer.Option(help="Times real time for legs of a metre.")] = 0.5,
+    seed: Annotated[int | None, typer.Option(help="Of the first episode.")] = None,
+) -> Output:
+    """Steer the walker in a window: a and d move the masses left and right, w and s walk faster and slower."""
+    import gymnasium as gym
+    from gymnasium.utils.play import play as play_env
+
+    from lean_yaw_env.envs import RealTime
+
+    try:
+        env = gym.make(env_id, render_mode="rgb_array", mirror=False)
+    except (gym.error.Error, TypeError) as error:
+        raise ValueError(f"env_id must be an environment of lean_yaw_env: {error}") from error
+    window = RealTime(env, speed=speed)
+    still = np.zeros(env.action_space.shape or (), dtype=np.float32)
+    return Output({"env_id": env_id}, lambda: play_env(window, seed=seed, noop=still))
 
 
 @command()
@@ -193,10 +294,21 @@ def view(
         typer.echo(f"the page is at {server.address} until Ctrl-C")
         try:
             server.wait()
-        except KeyboardInterrupt:
+        finally:
             server.close()
 
     return Output({"address": server.address}, serve)
+
+
+@command()
+def findings(
+    out: Annotated[Path, typer.Option(help="Folder for findings.md, findings.csv and images.")],
+) -> Output:
+    """Compute what this software finds beyond the paper: walking on the level, stability over bodies, what chosen steps can save."""
+    from lean_yaw_env.paper.findings import write_findings
+
+    page = write_findings(out, progress=sys.stderr.isatty())
+    return Output({"page": str(page)}, lambda: typer.echo(f"written: {page}"))
 
 
 @command()
@@ -220,7 +332,7 @@ def reproduce(
     markdown, page = write_report(reproduction, out)
 
     def show() -> None:
-        screen.show_reproduction(reproduction)
+        records.show_reproduction(reproduction)
         typer.echo(f"written: {markdown} and {page}")
 
     return Output({"counts": reproduction.counts(), "checks": reproduction.rows()}, show)

@@ -1,4 +1,4 @@
-"""Exact derivatives of an environment's step, through the same formulas by which it moves, pays and observes.
+"""Exact derivatives of an environment's step, through the formulas of its motion, reward and observation.
 
 Complex numbers carry them: an imaginary part of 1e-30 on one input gives imaginary parts 1e-30 times the derivatives, to round-off and
 without a difference of nearby numbers. The walking step's own come from ``kernel.jacobian``.
@@ -6,7 +6,7 @@ without a difference of nearby numbers. The walking step's own come from ``kerne
 Inputs are what a step's result depends on: the walker's ``FOLLOWED`` fields before the step, the task's fields of which ``is_followed`` is
 set, then what is commanded (``COMMANDED``). Outputs are the followed fields after the step, the observation, the reward, the duration.
 
-``differentiate`` is a template, as ``judging.judge`` is.
+``differentiate`` is a template, as ``outputs.write_outputs`` is.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from lean_yaw_env.envs.dynamics import move
-from lean_yaw_env.envs.judging import no_refresh
 from lean_yaw_env.envs.observation import (
     ANKLE_RATE,
     COMMON_CENTRES,
@@ -29,27 +28,25 @@ from lean_yaw_env.envs.observation import (
     common_values,
     mirror_sign,
 )
-from lean_yaw_env.envs.state import WALKER_FIELDS, Field, complex_type
+from lean_yaw_env.envs.outputs import compiled_for
+from lean_yaw_env.envs.simulation import Simulation
+from lean_yaw_env.envs.state import WALKER_FIELDS, Field, record_type, states_of
 from lean_yaw_env.kernel.compilation import borrowed, formula, written_formula
-from lean_yaw_env.kernel.records import STEPPED, Outcome
-from lean_yaw_env.parameters import STATE_FIELDS
+from lean_yaw_env.kernel.jacobian import OUTPUTS, step_jacobians
+from lean_yaw_env.kernel.records import STEPPED, Command, Outcome
+from lean_yaw_env.parameters import STATE_FIELDS, STATE_SIZE, Vector
+from lean_yaw_env.threads import share_out
 
 FOLLOWED = (*(field.name for field in STATE_FIELDS), "mass_offset", "place_x", "place_z")
 COMMANDED = ("inter_leg_angle", "commanded_offset", "effort")
 TINY = 1e-30
 # Of the walking step's inputs (``kernel.jacobian``): the state, the inter-leg angle, the offset, the offset before.
 _OFFSET_BEFORE, _ANGLE, _OFFSET = 7, 5, 6
-_FELL = 1
 
 
-def followed_fields(fields: Sequence[Field]) -> tuple[str, ...]:
-    """Names of the fields of a task's record that derivatives lead through."""
-    return tuple(field.name for field in fields if field.is_followed)
-
-
-def differentiation_tables(fields: Sequence[Field]) -> dict[str, Any]:
+def _tables(fields: Sequence[Field]) -> dict[str, Any]:
     """What ``differentiate`` takes of a task's fields: formulas that copy, seed and read records."""
-    own = followed_fields(fields)
+    own = _followed(fields)
     seeds = [("walker", name) for name in FOLLOWED] + [("task", name) for name in own]
     seeds += [("walker", name) for name in COMMANDED]
     kernel = [*range(5), _OFFSET_BEFORE, -1, -1, *(-1 for _ in own), _ANGLE, _OFFSET, -1]
@@ -74,26 +71,26 @@ def differentiation_tables(fields: Sequence[Field]) -> dict[str, Any]:
         ),
         "KERNEL_INPUTS": tuple(kernel),
         "FOLLOWED_SIZE": len(FOLLOWED) + len(own),
-        "WALKER_TYPE": complex_type(WALKER_FIELDS),
-        "TASK_TYPE": complex_type(fields),
+        "WALKER_TYPE": record_type(WALKER_FIELDS, "c16"),
+        "TASK_TYPE": record_type(fields, "c16"),
     }
+
+
+def _followed(fields: Sequence[Field]) -> tuple[str, ...]:
+    """Names of the fields of a task's record that derivatives lead through."""
+    return tuple(field.name for field in fields if field.is_followed)
 
 
 def _copy(fields: Sequence[Field]) -> Any:
     """The formula ``copy(target, source)`` of a record with these fields."""
-    places = [
-        place
-        for field in fields
-        for place in (
-            [field.name] if field.size == 1 else [f"{field.name}[{k}]" for k in range(field.size)]
-        )
-    ]
+    places = [field.name for field in fields if field.size == 1]
+    places += [f"{each.name}[{k}]" for each in fields if each.size > 1 for k in range(each.size)]
     lines = [f"target.{place} = source.{place}" for place in places]
     return written_formula("copy", ("target", "source"), lines or ["pass"])
 
 
 TASK_REWARD: Any = None
-TASK_REFRESH: Any = no_refresh
+TASK_REFRESH: Any = None
 TASK_FEATURES: Any = None
 CENTRES, SCALES, ODD = COMMON_CENTRES, COMMON_SCALES, COMMON_ODD
 COPY_WALKER: Any = None
@@ -196,3 +193,72 @@ def differentiate(befores, tasks_before, walkers, tasks, settings, steps, jacobi
             row = read_observation(column, walker, task, common)
             column[row] = reward.imag / TINY
             column[row + 1] = walker.duration.imag / TINY
+
+
+class LinearisedSteps:
+    """Exact derivatives of a simulation's steps.
+
+    Call ``prepare`` before a step and ``jacobians`` after it, before any walker is reset.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    threads : int >= 1
+
+    Attributes
+    ----------
+    followed : names of the fields that a step's result depends on, of the walker's record and then the task's
+    inputs : names of the Jacobians' columns: the followed fields before the step, and what was commanded
+    outputs : names of their rows: the followed fields after it, the observation, ``reward``, ``duration``
+    """
+
+    def __init__(self, simulation: Simulation, *, threads: int = 1) -> None:
+        self._simulation = simulation
+        self._threads = threads
+        task = simulation.task
+        observed = simulation.options.observation_names(task)
+        self.followed = (*FOLLOWED, *_followed(task.fields))
+        self.inputs = (*self.followed, *COMMANDED)
+        self.outputs = (*self.followed, *observed, "reward", "duration")
+        n = simulation.n
+        self._differentiate = compiled_for(
+            task, differentiate, ("read_observation",), lambda: _tables(task.fields)
+        )
+        self._before = simulation.walkers.copy(), simulation.tasks.copy()
+        self._afters = np.zeros(n), np.zeros((n, STATE_SIZE))
+        self._steps = np.zeros((n, len(OUTPUTS), STATE_SIZE + len(Command._fields)))
+
+    def prepare(self) -> None:
+        """Note the records before a step."""
+        walkers, tasks = self._before
+        walkers[:], tasks[:] = self._simulation.walkers, self._simulation.tasks
+
+    def values(self) -> Vector:
+        """The followed fields as they are, shape (n, followed)."""
+        walkers, tasks = self._simulation.walkers, self._simulation.tasks
+        own = self.followed[len(FOLLOWED) :]
+        columns = [walkers[name] for name in FOLLOWED] + [tasks[name] for name in own]
+        return np.column_stack(columns)
+
+    def jacobians(self) -> Vector:
+        """The derivatives of the step since ``prepare``, shape (n, outputs, inputs), in a fresh array; zeros for a step that was a fall."""
+        simulation = self._simulation
+        before, tasks_before = self._before
+        walkers = simulation.walkers
+        commands = [walkers["inter_leg_angle"], walkers["commanded_offset"], before["mass_offset"]]
+        given = (
+            np.column_stack(commands),
+            np.ascontiguousarray(states_of(before)),
+            np.ascontiguousarray(before["side"]),
+        )
+        found = np.zeros((simulation.n, len(self.outputs), len(self.inputs)))
+
+        def share(first: int, last: int) -> None:
+            step_jacobians(simulation.bodies, *given, *self._afters, self._steps, first, last)
+            self._differentiate(
+                before, tasks_before, walkers, simulation.tasks, simulation.settings,
+                self._steps, found, first, last,
+            )  # fmt: skip
+
+        share_out(share, simulation.n, self._threads)
+        return found

@@ -7,21 +7,12 @@
 from __future__ import annotations
 
 import inspect
-import os
 import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from lean_yaw_env.envs.info import (
-    BODY_INFOS,
-    COMMON_INFOS,
-    FALL_INFO,
-    FOOTPRINT_INFO,
-    HEADING_INFO,
-    PUSH_INFOS,
-    STATE_INFO,
-)
+from lean_yaw_env.envs.info import INFOS, OPTIONAL_INFOS
 from lean_yaw_env.envs.observation import (
     OBSERVATION_LIMIT,
     OFFSET_SCALE,
@@ -31,12 +22,9 @@ from lean_yaw_env.envs.observation import (
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.reset import BODY_DEVIATIONS, HELD_OUT_REACH, START_DEVIATIONS
 from lean_yaw_env.envs.tasks import Task, task_named
+from lean_yaw_env.files import write_text
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, PARAMETER_NAMES, STATE_FIELDS
 from lean_yaw_env.registration import NAMESPACE, TASK_VERSIONS
-
-INFOS = (STATE_INFO, FOOTPRINT_INFO, *COMMON_INFOS, FALL_INFO)
-"""Of every task."""
-OPTIONAL_INFOS = (HEADING_INFO, *PUSH_INFOS, *BODY_INFOS)
 
 
 def table(header: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
@@ -62,23 +50,17 @@ def describe_observation() -> str:
 def describe_action() -> str:
     """What an action means with the options' defaults."""
     options = EnvOptions()
-    reach = f"{options.mass_offset_range:g}"
-    return table(
-        ("number", "sets", "range"),
-        (
-            (
-                0,
-                f"inter-leg angle, {INTER_LEG_ANGLE} + {options.inter_leg_angle_range} a0 rad",
-                f"{INTER_LEG_ANGLE - options.inter_leg_angle_range:g} to {INTER_LEG_ANGLE + options.inter_leg_angle_range:g} rad",
-            ),
-            (
-                1,
-                f"mass offset, {reach} a1 leg lengths, positive to the right of a left stance (and its mirror image of a right one), as far as "
-                "the largest change per step allows",
-                f"-{reach} to {reach}",
-            ),
-        ),
+    middle, turn, reach = INTER_LEG_ANGLE, options.inter_leg_angle_range, options.mass_offset_range
+    angle = f"inter-leg angle, {middle} + {turn} a0 rad"
+    offset = (
+        f"mass offset, {reach:g} a1 leg lengths, positive to the right of a left stance (and its mirror image of a right one), as far as "
+        "the largest change per step allows"
     )
+    rows = (
+        (0, angle, f"{middle - turn:g} to {middle + turn:g} rad"),
+        (1, offset, f"-{reach:g} to {reach:g}"),
+    )
+    return table(("number", "sets", "range"), rows)
 
 
 def describe_start() -> str:
@@ -115,13 +97,13 @@ def describe_options() -> str:
 
 
 def describe_info() -> str:
-    """What every task's ``info`` tells."""
-    told = ((f"`{info.key}`", info.unit, info.meaning) for info in (*INFOS, *OPTIONAL_INFOS))
-    return table(("key", "unit", "meaning"), told)
+    """The contents of every task's ``info``."""
+    infos = ((f"`{info.key}`", info.unit, info.meaning) for info in (*INFOS, *OPTIONAL_INFOS))
+    return table(("key", "unit", "meaning"), infos)
 
 
 def describe_task(task: Task) -> str:
-    """One task: what is asked, observed, paid for and measured."""
+    """One task: what it asks, its observation, reward and metrics."""
     body = task.parameters
     slope = f"{body.slope:g} rad" + (", turning with the walker" if body.slope_turns else "")
     facts = [
@@ -138,20 +120,13 @@ def describe_task(task: Task) -> str:
         facts.append((f"reset option `{name}`", f"{command.meaning}; {bounds}"))
     facts.append(("versions", "; ".join(task.history)))
     parts = [task.summary, table(("", ""), facts)]
-    if task.observed:
+    observed = [(f.name, f.unit, f"{f.centre:g}", f"{f.scale:g}", f.meaning) for f in task.observed]
+    if observed:
         parts.append("Observed after the common numbers:")
-        parts.append(
-            table(
-                ("name", "unit", "centre", "scale", "meaning"),
-                (
-                    (f.name, f.unit, f"{f.centre:g}", f"{f.scale:g}", f.meaning)
-                    for f in task.observed
-                ),
-            )
-        )
+        parts.append(table(("name", "unit", "centre", "scale", "meaning"), observed))
     parts.append("Success, in `info`:")
     parts.append(
-        table(("key", "meaning"), ((f"`{key}`", m.meaning) for key, m in task.metrics.items()))
+        table(("key", "meaning"), [(f"`{k}`", m.meaning) for k, m in task.metrics.items()])
     )
     return "\n\n".join(parts)
 
@@ -191,11 +166,7 @@ def renewed(page: str) -> str:
 
 def main(path: str) -> None:
     """Renew a page's generated parts in place."""
-    page = Path(path)
-    text = renewed(page.read_text(encoding="utf-8"))
-    beside = page.with_suffix(".tmp")
-    beside.write_text(text, encoding="utf-8")
-    os.replace(beside, page)
+    write_text(Path(path), renewed(Path(path).read_text(encoding="utf-8")))
 
 
 if __name__ == "__main__":

@@ -13,10 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.envs.observation import OBSERVATION_LIMIT, STANCE_FOOT
 from lean_yaw_env.envs.simulation import Simulation
-from lean_yaw_env.envs.tasks.waypoint import BEARING_SCALE, DISTANCE_SCALE, RADIUS
-from lean_yaw_env.envs.tasks.waypointgoal import TASK
+from lean_yaw_env.envs.tasks.waypoints import (
+    BEARING_SCALE,
+    DISTANCE_SCALE,
+    RADIUS,
+    WAYPOINT_GOAL,
+)
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.envs.walker_env import WalkerEnv
+from lean_yaw_env.validation import require_mapping, require_numbers
 
 GOAL_SCALE = 8.0
 """Leg lengths that a goal's unit stands for; a power of two, so that scaling rounds nothing."""
@@ -27,7 +32,7 @@ _FOOT, _COSINE, _SINE, _SIZE = STANCE_FOOT, STANCE_FOOT + 1, STANCE_FOOT + 2, ST
 
 GoalObservation = dict[str, NDArray[Any]]
 Infos = Mapping[str, Any] | Sequence[Mapping[str, Any]] | NDArray[np.object_]
-"""What ``step`` told: of one walker, of many in one mapping of arrays, or of many one by one."""
+"""Infos of ``step``: of one walker, of many in one mapping of arrays, or of many one by one."""
 
 
 class GoalRules:
@@ -57,8 +62,8 @@ class GoalRules:
     ) -> NDArray[np.bool_]:
         """Whether the horizon, or the largest number of steps, cuts the episode; shape (...)."""
         limits = self.simulation.settings[0]
-        is_late = (_told(info, "time") >= limits["horizon"]) | (
-            _told(info, "steps") >= limits["max_episode_steps"]
+        is_late = (_numbers(info, "time") >= limits["horizon"]) | (
+            _numbers(info, "steps") >= limits["max_episode_steps"]
         )
         return np.asarray(is_late & ~self.compute_terminated(achieved_goal, desired_goal, info))
 
@@ -97,7 +102,7 @@ class WaypointGoalEnv(GoalRules, WalkerEnv):
     """
 
     def __init__(self, render_mode: str | None = None, **options: Any) -> None:
-        super().__init__(TASK, render_mode, **options)
+        super().__init__(WAYPOINT_GOAL, render_mode, **options)
         EzPickle.__init__(self, render_mode, **options)
         self.observation_space = _goal_space()
 
@@ -123,7 +128,7 @@ class WaypointGoalVectorEnv(GoalRules, WalkerVectorEnv):
     """``num_envs`` walkers, bit for bit as so many ``WaypointGoalEnv`` seeded ``seed + i``; parameters as ``WalkerVectorEnv``."""
 
     def __init__(self, num_envs: int = 1, **arguments: Any) -> None:
-        super().__init__(num_envs, TASK, **arguments)
+        super().__init__(num_envs, WAYPOINT_GOAL, **arguments)
         EzPickle.__init__(self, num_envs, **arguments)
         self.single_observation_space = _goal_space()
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -137,7 +142,9 @@ class WaypointGoalVectorEnv(GoalRules, WalkerVectorEnv):
 
 def is_reached(achieved_goal: ArrayLike, desired_goal: ArrayLike) -> NDArray[np.bool_]:
     """Whether places (..., 2) are within the goal's radius, shape (...), as the task itself decides it."""
-    apart = np.subtract(achieved_goal, desired_goal, dtype=np.float64)
+    achieved = require_numbers("achieved_goal", achieved_goal, 2)
+    desired = require_numbers("desired_goal", desired_goal, 2)
+    apart = achieved - desired
     square = apart[..., 0] * apart[..., 0] + apart[..., 1] * apart[..., 1]
     return np.asarray(np.sqrt(square) <= RADIUS / GOAL_SCALE)
 
@@ -196,11 +203,13 @@ def _goal_space() -> Any:
 
 
 def _fell(info: Infos) -> NDArray[np.bool_]:
-    return _told(info, "fall") != 0
+    return _numbers(info, "fall") != 0
 
 
-def _told(info: Infos, key: str) -> NDArray[Any]:
-    """A number of each info; 0 where it is not told."""
+def _numbers(info: Infos, key: str) -> NDArray[Any]:
+    """A number of each info; 0 where there is none."""
     if isinstance(info, Mapping):
         return np.asarray(info.get(key, 0))
-    return np.array([each.get(key, 0) for each in info])
+    if not isinstance(info, (list, tuple, np.ndarray)):
+        raise ValueError(f"info must be a mapping, or a sequence of them, got {info!r}")
+    return np.array([require_mapping("info", each).get(key, 0) for each in info])

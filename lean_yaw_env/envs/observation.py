@@ -1,4 +1,4 @@
-"""What is observed: (value - centre) / scale, kept within +-``OBSERVATION_LIMIT``, with the noise and the gaps that the options ask for."""
+"""What is observed: (value - centre) / scale, kept within +-``OBSERVATION_LIMIT``, with the noise and the hidden numbers that the options ask for."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ HEADING, PITCH_RATE, ANKLE_RATE, STANCE_FOOT = 0, 3, 4, 6
 
 @formula
 def common_values(walker: Any, settings: Any) -> Any:
-    """What every task observes, before it is mirrored and scaled; the heading is zero where it tells nothing."""
+    """What every task observes, before it is mirrored and scaled; the heading is zero on a slope that turns with the walker."""
     heading = wrapped(walker.heading)
     return (
         0.0 * heading if settings.hidden_heading != 0 else heading,
@@ -53,7 +53,7 @@ def limited(value: Any) -> Any:
 
 
 @formula
-def spoil(observation: Any, walker: Any, settings: Any) -> None:
+def corrupt(observation: Any, walker: Any, settings: Any) -> None:
     """Add noise to all of an observation but the stance foot, and hide the rates, as the options say."""
     foot = STANCE_FOOT if settings.mirror == 0 else -1
     if settings.sensor_noise > 0.0:

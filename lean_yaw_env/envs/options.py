@@ -18,8 +18,21 @@ from lean_yaw_env.envs.observation import COMMON_NAMES, OBSERVATION_LIMIT, STANC
 from lean_yaw_env.envs.reset import BODY_DEVIATIONS, HELD_OUT_REACH, BodyDraw
 from lean_yaw_env.envs.state import BODY_NAMES, SETTINGS, Records
 from lean_yaw_env.envs.tasks import Task
-from lean_yaw_env.parameters import INTER_LEG_ANGLE, QUARTER_TURN, WalkerParameters
-from lean_yaw_env.validation import require_flag, require_number, suggestion
+from lean_yaw_env.envs.tasks.task import TASK_RANGES
+from lean_yaw_env.parameters import (
+    INTER_LEG_ANGLE,
+    PARAMETER_NAMES,
+    PARAMETER_RANGES,
+    Range,
+    WalkerParameters,
+)
+from lean_yaw_env.validation import (
+    require_choice,
+    require_flag,
+    require_instance,
+    require_mapping,
+    suggestion,
+)
 from lean_yaw_env.walker import Walker
 
 RandomBody = Literal["training", "held-out"]
@@ -28,6 +41,16 @@ _BODY_DRAWS: dict[str | None, BodyDraw] = {
     "training": BodyDraw.TRAINING,
     "held-out": BodyDraw.HELD_OUT,
 }
+_RANGES = (
+    Range("inter_leg_angle_range", 0.0, INTER_LEG_ANGLE, "[)"),
+    Range("mass_offset_range", 0.0, 1.0),
+    Range("start_disturbance", 0.0, 5.0),
+    Range("sensor_noise", 0.0, 10.0),
+)
+_OPTIONAL_RANGES = (
+    *TASK_RANGES,
+    *(limits for limits in PARAMETER_RANGES if limits.name in ("slope", "friction_limit")),
+)
 _NO_LIMIT = 2**62  # steps
 
 
@@ -57,7 +80,7 @@ class EnvOptions:
     start_disturbance : [0, 5]
         Scales the random deviations of the start (``reset.START_DEVIATIONS``); 0 starts exactly in the gait, on either foot.
     mirror : bool
-        Show and command a right stance as its mirror image, so that a policy learns one foot. Without, observations tell the stance foot.
+        Show and command a right stance as its mirror image, so that a policy learns one foot. Without, observations contain the stance foot.
     sensor_noise : [0, 10]
         Standard deviation of noise on every number observed but the stance foot, in units of the observation.
     action_delay : bool
@@ -66,8 +89,8 @@ class EnvOptions:
         Show both rates as zero.
     random_body : None, "training" or "held-out"
         Draw hip width, foot radius, ankle tilt and slope anew for each episode, uniformly within ``reset.BODY_DEVIATIONS`` of the
-        parameters' for training, or outside that box but within one 1.5 times as large. The start is near the parameters' own gait; ``info``
-        tells the body, the observation does not.
+        parameters' for training, or outside that box but within one 1.5 times as large. The start is near the parameters' own gait. ``info``
+        contains the body, the observation does not.
     push_level : [0, 10], optional
         Scales random impulses on both rates after every step; 1 is 0.08 on the pitch rate and 0.15 on the ankle rate (standard
         deviations). The observation, and the state in ``info``, are those after the push. The task's default otherwise, mostly 0.
@@ -95,36 +118,34 @@ class EnvOptions:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", _parameters(self.parameters))
-        for name, low, high, bounds in _RANGES:
-            require_number(name, getattr(self, name), low, high, bounds)
-        for name, low, high, bounds in _OPTIONAL_RANGES:
-            if getattr(self, name) is not None:
-                require_number(name, getattr(self, name), low, high, bounds)
+        given = [limits for limits in _OPTIONAL_RANGES if getattr(self, limits.name) is not None]
+        for limits in (*_RANGES, *given):
+            limits.require(getattr(self, limits.name))
         for name in ("mirror", "action_delay", "hidden_rates"):
             require_flag(name, getattr(self, name))
         if self.random_body is not None:
-            _require_random_body(self.random_body)
+            require_choice("random_body", self.random_body, ("training", "held-out"))
 
     @classmethod
     def of(cls, arguments: Mapping[str, Any]) -> EnvOptions:
         """Options from an environment's keyword arguments, or ``TypeError`` naming one that there is not, and the nearest that there is."""
         known = [field.name for field in fields(cls)]
-        for name in arguments:
+        for name in require_mapping("arguments", arguments):
             if name not in known:
-                raise TypeError(f"option {name!r} is unknown{suggestion(name, known)}")
+                raise TypeError(f"unexpected keyword argument {name!r}{suggestion(name, known)}")
         return cls(**arguments)
 
     def for_task(self, task: Task) -> TaskOptions:
         """These options with the task's defaults in the place of None, and slope and friction limit among the parameters."""
+        require_instance("task", task, Task)
         parameters = task.parameters if self.parameters is None else self.parameters
         assert isinstance(parameters, WalkerParameters)
-        replaced = {
-            name: getattr(self, name)
-            for name in ("slope", "friction_limit")
-            if getattr(self, name) is not None
-        }
         return TaskOptions(
-            parameters=replace(parameters, **replaced),
+            parameters=replace(
+                parameters,
+                slope=_given(self.slope, parameters.slope),
+                friction_limit=_given(self.friction_limit, parameters.friction_limit),
+            ),
             max_offset_change=_given(self.max_offset_change, task.max_offset_change),
             horizon=_given(self.horizon, task.horizon),
             push_level=_given(self.push_level, task.push_level),
@@ -137,7 +158,8 @@ class EnvOptions:
     def observation_names(self, task: Task) -> tuple[str, ...]:
         """What each number of an observation is."""
         common = COMMON_NAMES[:STANCE_FOOT] if self.mirror else COMMON_NAMES
-        return (*common, *(feature.name for feature in task.observed))
+        own = require_instance("task", task, Task).observed
+        return (*common, *(feature.name for feature in own))
 
     def observation_space(self, task: Task) -> spaces.Space[NDArray[np.float32]]:
         """A box as large as ``observation_names``."""
@@ -211,34 +233,6 @@ def gait_of(parameters: WalkerParameters, pumping: float = 0.0) -> tuple[float, 
     return tuple(find_gait(walker, mass_offset=offset).tolist())
 
 
-_RANGES = (
-    (
-        "inter_leg_angle_range",
-        0.0,
-        min(INTER_LEG_ANGLE, QUARTER_TURN - INTER_LEG_ANGLE),
-        "[)",
-    ),
-    ("mass_offset_range", 0.0, 1.0, "[]"),
-    ("start_disturbance", 0.0, 5.0, "[]"),
-    ("sensor_noise", 0.0, 10.0, "[]"),
-)
-_OPTIONAL_RANGES = (
-    ("max_offset_change", 0.0, 2.0, "[]"),
-    ("horizon", 0.0, math.inf, "(]"),
-    ("slope", -0.5, 0.5, "[]"),
-    ("friction_limit", 0.0, math.inf, "(]"),
-    ("push_level", 0.0, 10.0, "[]"),
-)
-
-
-def _require_random_body(value: Any) -> None:
-    kinds = [kind for kind in _BODY_DRAWS if kind is not None]
-    if not isinstance(value, str) or value not in kinds:
-        raise ValueError(
-            f"random_body must be None or one of {', '.join(kinds)}, got {value!r}{suggestion(value, kinds)}"
-        )
-
-
 def _given(value: float | None, default: float) -> float:
     return default if value is None else value
 
@@ -250,10 +244,9 @@ def _parameters(value: Any) -> WalkerParameters | None:
         raise ValueError(
             f"parameters must be WalkerParameters or a mapping of their names, got {value!r}"
         )
-    known = [field.name for field in fields(WalkerParameters)]
     for name in value:
-        if name not in known:
-            raise ValueError(f"parameters has no {name!r}{suggestion(name, known)}")
+        if name not in PARAMETER_NAMES:
+            raise ValueError(f"parameters has no {name!r}{suggestion(name, PARAMETER_NAMES)}")
     return WalkerParameters(**value)
 
 

@@ -7,12 +7,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.envs.dynamics import command_many, walk_many, walk_one
 from lean_yaw_env.envs.info import FallCode, InfoMaker
-from lean_yaw_env.envs.judging import What
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, settings_of
+from lean_yaw_env.envs.outputs import Event, outputs_of
 from lean_yaw_env.envs.reset import start_episodes
 from lean_yaw_env.envs.state import (
     BODY_NAMES,
@@ -23,18 +23,27 @@ from lean_yaw_env.envs.state import (
     mirror,
     states_of,
 )
-from lean_yaw_env.envs.tasks import Command, Task
+from lean_yaw_env.envs.tasks import Task
 from lean_yaw_env.kernel.compilation import for_types_of
 from lean_yaw_env.parameters import Vector, WalkerParameters, require_foot, require_state
-from lean_yaw_env.validation import require_array, require_number, suggestion
+from lean_yaw_env.validation import (
+    require_array,
+    require_count,
+    require_instance,
+    require_mapping,
+    require_number,
+    require_shape,
+    suggestion,
+)
 from lean_yaw_env.walker import SIDE
 
 RESET_OPTIONS = ("state", "stance")
 """Of every task; some have commands besides."""
 _KEYS = 2**64
 _SOLVER = int(FallCode.SOLVER)
-_STEP, _START, _PLACE, _REPORT = (int(each) for each in What)
+_STEP, _RESET, _EDIT, _NONE = (int(event) for event in Event)
 Flags = NDArray[np.bool_]
+_SINGLE = np.dtype(np.float32)
 
 
 class Simulation:
@@ -53,7 +62,7 @@ class Simulation:
     walkers : records (n,), see ``state.WALKER_FIELDS``
     tasks : records (n,), see ``Task.fields``
     falls : shape (n,), a view of the walkers' field ``fall``
-    solver_failures : how many episodes have ended because the integrator gave a step up, as ``note_failures`` counts them
+    solver_failures : how many episodes have ended because the integrator failed, as ``note_failures`` counts them
     settings : record (1,), see ``state.SETTINGS_FIELDS``
     bodies : shape (n or 1, 11)
         The walkers' constants as the kernels take them; one row for all unless bodies are random.
@@ -66,9 +75,11 @@ class Simulation:
     def __init__(
         self, task: Task, options: EnvOptions, n: int, *, max_episode_steps: int | None = None
     ) -> None:
-        self.task = task
-        self.options = options
-        self.n = n
+        self.task = require_instance("task", task, Task)
+        self.options = require_instance("options", options, EnvOptions)
+        self.n = n = require_count("n", n)
+        if max_episode_steps is not None:
+            require_count("max_episode_steps", max_episode_steps)
         self.parameters = options.for_task(task).parameters
         self.settings = settings_of(options, task, max_episode_steps=max_episode_steps)
         one_each = options.random_body is not None
@@ -90,7 +101,9 @@ class Simulation:
         self._start_episodes = for_types_of(
             start_episodes, self.walkers, self.bodies, self.settings, self._nobody
         )
-        self._judge = for_types_of(task.judge, *self._judged(_STEP, self._nobody, None, 0, n))
+        self._write_outputs = for_types_of(
+            outputs_of(task), *self._arguments(_STEP, self._nobody, None, 0, n)
+        )
 
     @property
     def states(self) -> Vector:
@@ -131,7 +144,7 @@ class Simulation:
             self._keys[row] = generators[row].integers(_KEYS, dtype=np.uint64)
         skip = ~mask
         self._start_episodes(self.walkers, self.bodies, self.settings, skip)
-        self._judge(*self._judged(_START, skip, infos, 0, self.n))
+        self._write(_RESET, skip, infos)
 
     def place(self, mask: Flags, options: dict[str, Any], infos: Vector | None = None) -> None:
         """Override the drawn start by reset options (``RESET_OPTIONS``); arguments are checked before anything changes."""
@@ -146,17 +159,17 @@ class Simulation:
             for name, command in self.task.commands.items():
                 for field, value in zip(command.fields, checked.get(name, ()), strict=False):
                     task[field] = value
-        self._judge(*self._judged(_PLACE, ~mask, infos, 0, self.n))
+        self._write(_EDIT, ~mask, infos)
 
     def report(self, mask: Flags) -> Vector:
         """The infos of these walkers, as after their last step, among zeros for the others."""
         infos = self.new_infos(cleared=True)
-        self._judge(*self._judged(_REPORT, ~mask, infos, 0, self.n))
+        self._write(_NONE, ~mask, infos)
         return infos
 
     def observe(self) -> None:
         """Show records that were set by hand: derived fields and observations anew, without a step."""
-        self._judge(*self._judged(_PLACE, self._nobody, None, 0, self.n))
+        self._write(_EDIT, self._nobody, None)
 
     def command(self) -> None:
         """Put what ``actions`` command into the records (``inter_leg_angle``, ``commanded_offset``), without a step."""
@@ -173,7 +186,7 @@ class Simulation:
         """Reset options as numbers, or ``ValueError``."""
         checked: dict[str, Any] = {}
         known = (*RESET_OPTIONS, *self.task.commands)
-        for key in options:
+        for key in require_mapping("options", options):
             if key not in known:
                 raise ValueError(
                     f"reset option {key!r} is not one of {', '.join(known)} (task {self.task.name}){suggestion(key, known)}"
@@ -182,16 +195,26 @@ class Simulation:
             checked["side"] = SIDE[require_foot(options["stance"])]
         if "state" in options:
             checked["state"] = require_state(options["state"])
-        for name, command in self.task.commands.items():
-            if name in options:
-                checked[name] = _require_command(name, options[name], command)
+        for name, (fields, low, high, _) in self.task.commands.items():
+            if name in options and len(fields) == 1:
+                checked[name] = [require_number(name, options[name], low, high)]
+            elif name in options:
+                checked[name] = require_array(name, options[name], (len(fields),), low, high, "[]")
         return checked
+
+    def require_actions(
+        self, name: str, value: ArrayLike, shape: tuple[int, ...]
+    ) -> NDArray[np.float32]:
+        """Actions as float32 numbers, NaN included, of a shape; an array that is this already is returned as it is."""
+        if type(value) is np.ndarray and value.dtype == _SINGLE and value.shape == shape:
+            return value
+        return require_shape(name, value, shape).astype(np.float32)
 
     def step_one(self, infos: Vector) -> bool:
         """Step the only walker by ``actions``; return whether they are numbers, else nothing has changed."""
         if not self._walk_one(self.walkers, self.bodies, self.settings, self.actions):
             return False
-        self._judge(
+        self._write_outputs(
             _STEP, self.walkers, self.tasks, self.settings, self.observations, self.rewards,
             self.ends, infos, self._nobody, 0, 1,
         )  # fmt: skip
@@ -199,8 +222,8 @@ class Simulation:
 
     def step_many(self, skip: Flags, first: int, last: int, infos: Vector | None = None) -> None:
         """Step walkers ``first`` to ``last`` - 1 by ``actions``, which must be numbers, but for those to skip."""
-        self._walk_many(*self._walked(skip, first, last))
-        self._judge(*self._judged(_STEP, skip, infos, first, last))
+        self._walk_many(self.walkers, self.bodies, self.settings, self.actions, skip, first, last)
+        self._write_outputs(*self._arguments(_STEP, skip, infos, first, last))
 
     def body_parameters(self, row: int) -> WalkerParameters:
         """The parameters of a walker: of random bodies, its own."""
@@ -219,26 +242,20 @@ class Simulation:
 
     @cached_property
     def _walk_many(self) -> Any:
-        return for_types_of(walk_many, *self._walked(self._nobody, 0, self.n))
+        return for_types_of(
+            walk_many, self.walkers, self.bodies, self.settings, self.actions, self._nobody, 0, 0
+        )
 
-    def _walked(self, skip: Flags, first: int, last: int) -> tuple[Any, ...]:
-        return self.walkers, self.bodies, self.settings, self.actions, skip, first, last
+    def _write(self, event: int, skip: Flags, infos: Vector | None) -> None:
+        self._write_outputs(*self._arguments(event, skip, infos, 0, self.n))
 
-    def _judged(
-        self, what: int, skip: Flags, infos: Vector | None, first: int, last: int
+    def _arguments(
+        self, event: int, skip: Flags, infos: Vector | None, first: int, last: int
     ) -> tuple[Any, ...]:
-        told = self._no_infos if infos is None else infos
         return (
-            what, self.walkers, self.tasks, self.settings, self.observations, self.rewards,
-            self.ends, told, skip, first, last,
+            event, self.walkers, self.tasks, self.settings, self.observations, self.rewards,
+            self.ends, self._no_infos if infos is None else infos, skip, first, last,
         )  # fmt: skip
-
-
-def _require_command(name: str, value: Any, command: Command) -> list[float]:
-    size, low, high = len(command.fields), command.low, command.high
-    if size == 1:
-        return [require_number(name, value, low, high)]
-    return require_array(name, value, (size,), low, high, "[]").tolist()
 
 
 def _words(records: Records) -> NDArray[np.uint64]:

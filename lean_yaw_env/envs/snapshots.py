@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from lean_yaw_env.envs.simulation import Simulation
-from lean_yaw_env.envs.state import Records
+from lean_yaw_env.validation import require_mapping
 
 State = dict[str, NDArray[Any]]
 """Arrays by name; ``walkers`` and ``tasks`` are records with named fields."""
@@ -16,6 +17,20 @@ State = dict[str, NDArray[Any]]
 _ARRAYS = ("walkers", "tasks", "bodies", "observations")
 _WORDS = 6  # of 64 bits, that a PCG64 generator's state takes
 _WORD = 2**64
+
+
+class PickledWithState(EzPickle):
+    """An environment that is pickled as its arguments and, if episodes are under way, its state."""
+
+    def __getstate__(self: Any) -> dict[str, Any]:
+        state = self.get_state() if self.is_under_way else None
+        return {**EzPickle.__getstate__(self), "_state": state, "_spec": self.spec}
+
+    def __setstate__(self: Any, kept: dict[str, Any]) -> None:
+        EzPickle.__setstate__(self, kept)
+        self.spec = kept["_spec"]
+        if kept["_state"] is not None:
+            self.set_state(kept["_state"])
 
 
 def state_of(simulation: Simulation, generators: list[np.random.Generator]) -> State:
@@ -38,12 +53,17 @@ def restore(simulation: Simulation, state: State) -> list[np.random.Generator]:
     forms = {name: (array.shape, array.dtype) for name, array in own.items()}
     forms["generators"] = ((simulation.n, _WORDS), np.dtype(np.uint64))
     for name, (shape, kind) in forms.items():
-        given = state.get(name)
-        if given is None or given.shape != shape or given.dtype != kind:
-            found = "nothing" if given is None else f"shape {given.shape} of {given.dtype}"
+        given = require_mapping("state", state).get(name)
+        if not isinstance(given, np.ndarray) or given.shape != shape or given.dtype != kind:
+            is_array = isinstance(given, np.ndarray)
+            found = f"shape {given.shape} of {given.dtype}" if is_array else repr(given)
             raise ValueError(f"state must hold {name!r} in shape {shape} of {kind}, got {found}")
-    for name in ("walkers", "tasks"):
-        _require_numbers(name, state[name])
+        for field in given.dtype.names or ():
+            values = given[field]
+            if values.dtype.kind == "f" and not np.isfinite(values).all():
+                raise ValueError(
+                    f"state must hold finite numbers, got {name}[{field!r}] = {values}"
+                )
     for name, array in own.items():
         array[:] = state[name]
     return [_generator_of(words) for words in state["generators"]]
@@ -63,17 +83,11 @@ def from_plain(simulation: Simulation, arrays: dict[str, NDArray[Any]]) -> State
     for name in ("walkers", "tasks"):
         kind = getattr(simulation, name).dtype
         words = arrays.get(name)
-        if words is None or words.ndim != 2 or 8 * words.shape[1] != kind.itemsize:
-            raise ValueError(f"snapshot must hold {name!r} in rows of {kind.itemsize // 8} words")
+        size = kind.itemsize // 8
+        if not isinstance(words, np.ndarray) or words.ndim != 2 or words.shape[1] != size:
+            raise ValueError(f"snapshot must hold {name!r} in rows of {size} words, got {words!r}")
         state[name] = np.ascontiguousarray(words, dtype=np.uint64).view(kind)[:, 0]
     return state
-
-
-def _require_numbers(name: str, records: Records) -> None:
-    for field in records.dtype.names or ():
-        values = records[field]
-        if values.dtype.kind == "f" and not np.isfinite(values).all():
-            raise ValueError(f"state must hold finite numbers, got {name}[{field!r}] = {values}")
 
 
 def _words_of(generator: np.random.Generator) -> list[int]:
@@ -86,7 +100,7 @@ def _words_of(generator: np.random.Generator) -> list[int]:
 
 
 def _generator_of(words: NDArray[np.uint64]) -> np.random.Generator:
-    """The generator that ``_words_of`` tells the state of."""
+    """The generator of a state from ``_words_of``."""
     high, low, high_increment, low_increment, has_uint32, uinteger = (int(word) for word in words)
     bits = np.random.PCG64()
     bits.state = {

@@ -23,31 +23,21 @@ BODY_NAMES = PARAMETER_NAMES[:BODY_SIZE]
 
 
 class Field(NamedTuple):
-    """One field of a record.
-
-    Attributes
-    ----------
-    name, unit, meaning : str
-    kind : "f8" for a number, "i8" for a count, a code or a flag, "u8" for what random numbers are made of
-        Derivatives lead through numbers alone.
-    size : int
-        How many numbers it holds: an array if more than one.
-    initial : float
-        Its value at the start of an episode.
-    is_odd : bool
-        It changes sign in a mirror image of the world.
-    is_followed : bool
-        ``Task.refresh`` sets it and the next step's reward reads it: derivatives lead through it from step to step.
-    """
+    """One field of a record."""
 
     name: str
     unit: str
     meaning: str
     kind: Literal["f8", "i8", "u8"] = "f8"
+    """ "f8" for a number, "i8" for a count, a code or a flag, "u8" for what random numbers are made of. Derivatives lead through numbers alone."""
     size: int = 1
+    """How many numbers it holds: an array if more than one."""
     initial: float = 0.0
+    """Its value at the start of an episode."""
     is_odd: bool = False
+    """It changes sign in a mirror image of the world."""
     is_followed: bool = False
+    """``Task.refresh`` sets it and the next step's reward reads it: derivatives lead through it from step to step."""
 
 
 _WORK = "weight times leg length"
@@ -127,20 +117,14 @@ SETTINGS_FIELDS = (
 """What is fixed for an environment: its options, made into numbers."""
 
 
-def record_type(fields: Sequence[Field]) -> np.dtype[np.void]:
-    """The type of a record with these fields; of none, a record with nothing in it but a place."""
-    return np.dtype([_entry(field, field.kind) for field in fields] or [("unused", "f8")])
-
-
-def complex_type(fields: Sequence[Field]) -> np.dtype[np.void]:
-    """The same with complex numbers, whose imaginary parts carry a derivative."""
-    kinds = ["c16" if field.kind == "f8" else field.kind for field in fields]
-    entries = [_entry(field, kind) for field, kind in zip(fields, kinds, strict=True)]
-    return np.dtype(entries or [("unused", "c16")])
-
-
-def _entry(field: Field, kind: str) -> Any:
-    return (field.name, kind) if field.size == 1 else (field.name, kind, (field.size,))
+def record_type(fields: Sequence[Field], number: Literal["f8", "c16"] = "f8") -> np.dtype[np.void]:
+    """The type of a record with these fields; "c16" for complex numbers, whose imaginary parts carry a derivative."""
+    kinds = [number if field.kind == "f8" else field.kind for field in fields]
+    entries: list[Any] = [
+        (field.name, kind) if field.size == 1 else (field.name, kind, (field.size,))
+        for field, kind in zip(fields, kinds, strict=True)
+    ]
+    return np.dtype(entries or [("unused", number)])
 
 
 WALKER = record_type(WALKER_FIELDS)

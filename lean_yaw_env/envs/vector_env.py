@@ -3,30 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy as copied
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import EzPickle, seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from lean_yaw_env.envs.info import InfoPages
+from lean_yaw_env.envs.info import InfoTables
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, action_space
-from lean_yaw_env.envs.pictures import RENDER_FPS, Gallery
+from lean_yaw_env.envs.pictures import MOST_PICTURES, STEPS_PER_SECOND, Gallery
 from lean_yaw_env.envs.simulation import Simulation
-from lean_yaw_env.envs.snapshots import State, restore, state_of
+from lean_yaw_env.envs.snapshots import PickledWithState, State, restore, state_of
 from lean_yaw_env.envs.tasks import Task, task_named
 from lean_yaw_env.parameters import Vector
-from lean_yaw_env.threads import share_out
-from lean_yaw_env.validation import require_choice, require_count
+from lean_yaw_env.rendering.pygame_renderer import LEAST_SIZE, Renderer
+from lean_yaw_env.threads import MOST_THREADS, share_out
+from lean_yaw_env.validation import (
+    require_choice,
+    require_count,
+    require_flag,
+    require_mapping,
+    require_seed,
+)
 
 _RENDER_MODES = ("rgb_array",)
 Observations = NDArray[np.float32]
 
 
-class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]], EzPickle):
+class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
     """``num_envs`` walkers at a task, bit for bit as so many ``WalkerEnv`` seeded ``seed + i``.
 
     Parameters
@@ -58,6 +67,7 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
     """
 
     metadata: dict[str, Any] = {}  # noqa: RUF012 (each environment sets its own)
+    _spec: EnvSpec | None = None
 
     def __init__(
         self,
@@ -77,20 +87,24 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
             threads=threads, max_episode_steps=max_episode_steps, render_mode=render_mode, **options,
         )  # fmt: skip
         self.num_envs = require_count("num_envs", num_envs)
-        self.threads = require_count("threads", threads, 1, 1024)
+        self.threads = require_count("threads", threads, 1, MOST_THREADS)
         if max_episode_steps is not None:
             require_count("max_episode_steps", max_episode_steps)
         if render_mode is not None:
             require_choice("render_mode", render_mode, _RENDER_MODES)
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+            require_count("num_envs with a render_mode", num_envs, 1, MOST_PICTURES)
+        if not isinstance(autoreset_mode, AutoresetMode):
+            modes = [mode.value for mode in AutoresetMode]
+            autoreset_mode = AutoresetMode(require_choice("autoreset_mode", autoreset_mode, modes))
+        self.autoreset_mode = autoreset_mode
         self.metadata = {
             "autoreset_mode": self.autoreset_mode,
             "render_modes": list(_RENDER_MODES),
-            "render_fps": RENDER_FPS,
+            "render_fps": STEPS_PER_SECOND,
         }
         self.render_mode = render_mode
-        self.copy = copy
-        self.step_info = step_info
+        self.copy = require_flag("copy", copy)
+        self.step_info = require_flag("step_info", step_info)
         self.options = EnvOptions.of(options)
         self.task = task_named(task)
         self.simulation = Simulation(
@@ -102,9 +116,11 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._generators: list[np.random.Generator] | None = None
         self._ended = np.ones(self.num_envs, dtype=np.bool_)
-        self._tells_episodes = step_info
-        self._gallery = None if render_mode is None else Gallery(self.simulation)
-        self._pages = InfoPages(self.simulation.info, self.num_envs)
+        self._reports_episodes = step_info
+        self._gallery = None
+        if render_mode is not None:
+            self._gallery = Gallery(self.simulation, Renderer(LEAST_SIZE))
+        self._tables = InfoTables(self.simulation.info, self.num_envs)
 
     def reset(
         self,
@@ -117,17 +133,17 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         A number seeds walker i by ``seed + i``, a sequence each by its own; None goes on with the generators there are. Other options are
         those of ``WalkerEnv.reset``, for every walker that is reset.
         """
-        placement = dict(options or {})
+        placement = {} if options is None else dict(require_mapping("options", options))
         mask = self._reset_mask(placement.pop("reset_mask", None))
         self.simulation.check_options(placement)
-        self._seed(seed, mask)
-        infos = self.simulation.new_infos(cleared=True) if self._tells_episodes else None
+        self._seed(self._require_seeds(seed), mask)
+        infos = self.simulation.new_infos(cleared=True) if self._reports_episodes else None
         self._begin(mask, infos)
         if placement:
             self.simulation.place(mask, placement, infos)
             if self._gallery is not None:
                 self._gallery.restart(mask)
-        return self._observations(), self._told(infos, mask)
+        return self._observations(), self._info(infos, mask)
 
     def step(
         self, actions: ArrayLike
@@ -142,8 +158,8 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
                 f"walkers {np.flatnonzero(self._ended).tolist()} have ended; reset them by options={{'reset_mask': ...}}"
             )
         simulation.actions[:] = self._require_actions(actions)
-        page = self._pages.take() if self.step_info else None
-        infos = None if page is None else page.table
+        table = self._tables.take() if self.step_info else None
+        infos = None if table is None else table.rows
         simulation.renew_results()
         share_out(
             lambda first, last: simulation.step_many(self._ended, first, last, infos),
@@ -162,8 +178,10 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         final: dict[str, Any] = {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP and ends:
             final = self._restart_in_same_step(infos)
-        info = {} if page is None else page.info(simulation.falls)
-        return self._observations(), rewards, terminated, truncated, final | info
+        if table is not None:
+            table.falls[:] = simulation.falls
+            final |= table.info
+        return self._observations(), rewards, terminated, truncated, final
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """A picture of each walker just after its last heel strike, (height, width, 3), as ``SyncVectorEnv`` gives them; recorders put them side by side."""
@@ -173,6 +191,11 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         if self._generators is None:
             raise gym.error.ResetNeeded("call reset() before render()")
         return self._gallery.frames()
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether episodes have begun."""
+        return self._generators is not None
 
     def get_state(self) -> State:
         """Copies of all that the next step depends on, random streams included, as arrays by name; see ``WalkerEnv.get_state``."""
@@ -188,32 +211,31 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         ValueError
             If it is no such state; nothing has changed then.
         """
-        ended = state.get("ended")
-        if ended is None or ended.shape != (self.num_envs,) or ended.dtype != np.bool_:
-            raise ValueError(f"state must hold 'ended', bool, in shape ({self.num_envs},)")
+        ended = require_mapping("state", state).get("ended")
+        if not _is_flags(ended, self.num_envs):
+            raise ValueError(
+                f"state must hold 'ended', bool, in shape ({self.num_envs},), got {ended!r}"
+            )
         self._generators = restore(self.simulation, state)
         self._ended[:] = ended
         if self._gallery is not None:
             self._gallery.restart(np.ones(self.num_envs, dtype=np.bool_))
 
-    def __getstate__(self) -> dict[str, Any]:
-        """The arguments, and the state of episodes under way."""
-        state = None if self._generators is None else self.get_state()
-        return {**EzPickle.__getstate__(self), "_state": state, "_spec": self.spec}
+    @property
+    def spec(self) -> EnvSpec | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """What the environment is made from, its ``max_episode_steps`` included; ``gymnasium.make_vec`` sets it."""
+        return self._spec
 
-    def __setstate__(self, kept: dict[str, Any]) -> None:
-        state, spec = kept["_state"], kept["_spec"]
-        EzPickle.__setstate__(self, kept)
-        self.spec = spec
-        if state is not None:
-            self.set_state(state)
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = copied(spec)
+        if self._spec is not None:
+            # make_vec leaves it among the arguments
+            limit = self._spec.kwargs.get("max_episode_steps", self._spec.max_episode_steps)
+            self._spec.max_episode_steps = limit
 
     def _require_actions(self, actions: ArrayLike) -> NDArray[np.float32]:
-        chosen = np.asarray(actions, dtype=np.float32)
-        if chosen.shape != self.simulation.actions.shape:
-            raise ValueError(
-                f"actions must have shape ({self.num_envs}, {ACTION_SIZE}), got {chosen.shape}"
-            )
+        chosen = self.simulation.require_actions("actions", actions, (self.num_envs, ACTION_SIZE))
         if np.count_nonzero(np.isfinite(chosen)) < chosen.size:
             bad = ~np.isfinite(chosen).all(axis=1) & ~self._ended
             if bad.any():
@@ -229,39 +251,34 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
         for i in np.flatnonzero(mask).tolist():
             observations[i] = self._observation(i)
         final = {"final_obs": observations, "_final_obs": mask}
-        if self._tells_episodes:
-            told = self._told(self.simulation.report(mask), mask)
-            final |= {"final_info": told, "_final_info": mask}
+        if self._reports_episodes:
+            ended = self._info(self.simulation.report(mask), mask)
+            final |= {"final_info": ended, "_final_info": mask}
         self._begin(mask, infos)
         return final
 
     def _reset_mask(self, mask: Any) -> NDArray[np.bool_]:
         if mask is None:
             return np.ones(self.num_envs, dtype=np.bool_)
-        if (
-            not isinstance(mask, np.ndarray)
-            or mask.dtype != np.bool_
-            or mask.shape != (self.num_envs,)
-        ):
+        if not _is_flags(mask, self.num_envs):
             raise ValueError(
                 f"reset_mask must be a bool array of shape ({self.num_envs},), got {mask!r}"
             )
         if not mask.any():
-            raise ValueError("reset_mask must be true for at least one walker")
+            raise ValueError(f"reset_mask must be true for at least one walker, got {mask}")
         return mask.copy()
 
-    def _seed(self, seed: int | Sequence[int | None] | None, mask: NDArray[np.bool_]) -> None:
+    def _require_seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        """A seed for each walker."""
+        if not isinstance(seed, (list, tuple, np.ndarray)):
+            first = require_seed("seed", seed)
+            return [None if first is None else first + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(f"seed must be one number or {self.num_envs} of them, got {len(seed)}")
+        return [require_seed(f"seed[{i}]", each) for i, each in enumerate(seed)]
+
+    def _seed(self, seeds: list[int | None], mask: NDArray[np.bool_]) -> None:
         """Give the walkers of the mask their generators."""
-        if seed is None:
-            seeds: list[int | None] = [None] * self.num_envs
-        elif isinstance(seed, (int, np.integer)):
-            seeds = [int(seed) + i for i in range(self.num_envs)]
-        else:
-            seeds = list(seed)
-            if len(seeds) != self.num_envs:
-                raise ValueError(
-                    f"seed must be one number or {self.num_envs} of them, got {len(seeds)}"
-                )
         if self._generators is None:
             self._generators = [seeding.np_random(s)[0] for s in seeds]
             return
@@ -283,8 +300,13 @@ class WalkerVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]
     def _observation(self, row: int) -> Any:
         return self.simulation.observations[row].copy()
 
-    def _told(self, infos: Vector | None, mask: NDArray[np.bool_]) -> dict[str, Any]:
+    def _info(self, infos: Vector | None, mask: NDArray[np.bool_]) -> dict[str, Any]:
         if infos is None:
             return {}
         falls = np.where(mask, self.simulation.falls, 0)
         return self.simulation.info.many(infos, falls, mask)
+
+
+def _is_flags(value: Any, n: int) -> bool:
+    """Whether it is a bool array (n,)."""
+    return isinstance(value, np.ndarray) and value.dtype == np.bool_ and value.shape == (n,)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from itertools import combinations
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -12,21 +11,24 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils import EzPickle
 from numpy.typing import ArrayLike, NDArray
 
-from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, action_space
-from lean_yaw_env.envs.pictures import RENDER_FPS, Footage
+from lean_yaw_env.envs.pictures import FRAMES_PER_SECOND, STEPS_PER_SECOND, Gallery
 from lean_yaw_env.envs.simulation import Simulation
-from lean_yaw_env.envs.snapshots import State, restore, state_of
+from lean_yaw_env.envs.snapshots import PickledWithState, State, restore, state_of
 from lean_yaw_env.envs.tasks import Task, task_named
+from lean_yaw_env.rendering.filming import Frame
 from lean_yaw_env.rendering.pygame_renderer import Renderer
-from lean_yaw_env.validation import require_choice
+from lean_yaw_env.validation import require_choice, require_seed
 
-_KEYS = {"w": (-1.0, 0.0), "s": (1.0, 0.0), "a": (0.0, -1.0), "d": (0.0, 1.0)}
+_KEYS = {
+    key: np.array(action, dtype=np.float32)
+    for key, action in {"w": (-1, 0), "s": (1, 0), "a": (0, -1), "d": (0, 1)}.items()
+}
 """What each key adds to the action: short steps are fast ones, and the walker turns to the side of its masses."""
 _ONE = np.ones(1, dtype=np.bool_)
 
 
-class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
+class WalkerEnv(PickledWithState, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     """The walker of Wisse and Schwab at a task; see ``docs/environments.md`` for each task's tables.
 
     ## Action space
@@ -52,15 +54,16 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
     | last | the task's features | | |
 
     ## Ends
-    A fall is ``terminated``, the horizon of simulated time is ``truncated``. A step that the integrator gives up is ``terminated`` too, without
+    A fall is ``terminated``, the horizon of simulated time is ``truncated``. A failure of the integrator is ``terminated`` too, without
     reward: ``info["fall"]`` is then ``FallCode.SOLVER``, and the walker stands where the step began.
 
     Parameters
     ----------
     task : str or Task
         A task's name, its environment id, or a task of your own.
-    render_mode : None, "rgb_array" or "human"
-        Pictures need pygame, windows a display.
+    render_mode : None, "rgb_array", "rgb_array_list" or "human"
+        ``render`` returns the picture after the last heel strike, or a list of pictures within the steps since it was last called; "human" shows
+        these in a window, in real time. Pictures need pygame, windows a display. ``RealTime`` makes films with Gymnasium's ``RecordVideo``.
     **options
         See ``EnvOptions``.
 
@@ -74,9 +77,9 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         If the walker has no gait to start from.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # pyright: ignore[reportIncompatibleVariableOverride]
-        "render_modes": ["rgb_array", "human"],
-        "render_fps": RENDER_FPS,
+    metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium has it so
+        "render_modes": ["rgb_array", "rgb_array_list", "human"],
+        "render_fps": STEPS_PER_SECOND,
     }
 
     def __init__(
@@ -86,6 +89,8 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         if render_mode is not None:
             require_choice("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
+        if render_mode in ("rgb_array_list", "human"):
+            self.metadata = {**self.metadata, "render_fps": FRAMES_PER_SECOND}
         self.options = EnvOptions.of(options)
         self.task = task_named(task)
         self.simulation = Simulation(self.task, self.options, 1)
@@ -93,9 +98,9 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         self.action_space = action_space()
         self._infos = self.simulation.new_infos()
         self._views = self.simulation.info.views(self._infos[0])
-        self._running = False
-        self._renderer = None if render_mode is None else Renderer()
-        self._footage: Footage | None = None
+        self.is_under_way = self._has_begun = False
+        self._gallery = None if render_mode is None else Gallery(self.simulation, Renderer())
+        self._frames: list[Frame] = []
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -106,35 +111,33 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         (``Task.commands``), in place of what would be drawn.
         """
         simulation = self.simulation
-        simulation.check_options(options or {})
-        super().reset(seed=seed)
+        options = {} if options is None else options
+        simulation.check_options(options)
+        super().reset(seed=require_seed("seed", seed))
         simulation.start(_ONE, [self.np_random], self._infos)
         if options:
             simulation.place(_ONE, options, self._infos)
-        self._running = True
-        self._begin_footage()
+        self._begin()
         return simulation.observations[0].copy(), self._info()
 
     def step(
         self, action: ArrayLike
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Walk one step."""
-        if not self._running:
+        if not self.is_under_way:
             raise ResetNeeded("call reset() before the first step and after the end of an episode")
         simulation = self.simulation
-        chosen = np.asarray(action, dtype=np.float32)
-        if chosen.shape != (ACTION_SIZE,):
-            raise ValueError(f"action must have shape ({ACTION_SIZE},), got {chosen.shape}")
+        chosen = simulation.require_actions("action", action, (ACTION_SIZE,))
         simulation.actions[0] = chosen
         if not simulation.step_one(self._infos):
             raise ValueError(f"action must be numbers in [-1, 1], got {chosen.tolist()}")
         (terminated,), (truncated,) = simulation.ends.tolist()
         if terminated:
             simulation.note_failures()
-        self._running = not (terminated or truncated)
-        if self._footage is not None:
-            self._footage.extend()
-            self._show()
+        self.is_under_way = not (terminated or truncated)
+        if self._gallery is not None:
+            self._gallery.extend(_ONE)
+            self._show(self._gallery)
         return (
             simulation.observations[0].copy(),
             simulation.rewards.item(),
@@ -149,7 +152,7 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         With ``set_state`` an environment plans: keep a state, try actions, go back. ``walkers`` and ``tasks`` are records with named fields
         (``envs.state.WALKER_FIELDS``, ``Task.fields``).
         """
-        if not self._running:
+        if not self.is_under_way:
             raise ResetNeeded(
                 "call reset() before get_state(): the episode is over or has not begun"
             )
@@ -164,31 +167,29 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
             If it is no such state; nothing has changed then.
         """
         (self.np_random,) = restore(self.simulation, state)
-        self._running = True
-        self._begin_footage()
+        self._begin()
 
-    def __getstate__(self) -> dict[str, Any]:
-        """The arguments, and the state of an episode under way."""
-        state = self.get_state() if self._running else None
-        return {**EzPickle.__getstate__(self), "_state": state, "_spec": self.spec}
-
-    def __setstate__(self, kept: dict[str, Any]) -> None:
-        state, spec = kept["_state"], kept["_spec"]
-        EzPickle.__setstate__(self, kept)
-        self.spec = spec
-        if state is not None:
-            self.set_state(state)
-
-    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The picture just after the last heel strike, for "rgb_array"; shape (height, width, 3)."""
-        if self.render_mode is None:
+    def render(self) -> Frame | list[Frame] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """A picture, (height, width, 3), or a list of them, as the render mode says."""
+        if self._gallery is None:
             gym.logger.warn("render() draws nothing: make the environment with a render_mode")
             return None
-        if self._footage is None or self._renderer is None:
+        if self.render_mode == "rgb_array":
+            return self.picture()
+        frames, self._frames = self._frames, []
+        return frames if self.render_mode == "rgb_array_list" else None
+
+    def picture(self, share: float = 1.0) -> Frame:
+        """The picture after a share of the last step, (height, width, 3): at 1, just after the heel strike or where the walker fell.
+
+        Raises
+        ------
+        ResetNeeded
+            Before the first episode, and without a ``render_mode``.
+        """
+        if self._gallery is None or not self._has_begun:
             raise ResetNeeded("call reset() before render()")
-        if self.render_mode == "human":
-            return None
-        return self._renderer.frame(self._footage.scene(self._fall()))
+        return self._gallery.frame(share=share)
 
     def get_keys_to_action(self) -> dict[str, NDArray[np.float32]]:
         """Actions of keys held together, for ``gymnasium.utils.play``: "a" and "d" steer left and right, "w" and "s" walk faster and slower.
@@ -201,31 +202,29 @@ class WalkerEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         if self.options.mirror:
             raise ValueError("mirror must be False for keys that steer left and right, got True")
         held = [keys for n in range(len(_KEYS) + 1) for keys in combinations(_KEYS, n)]
-        return {"".join(keys): _action_of(keys) for keys in held}
+        still = np.zeros(ACTION_SIZE, dtype=np.float32)
+        return {"".join(keys): sum((_KEYS[key] for key in keys), still) for keys in held}
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        if self._renderer is not None:
-            self._renderer.close()
+        if self._gallery is not None:
+            self._gallery.renderer.close()
 
     def _info(self) -> dict[str, Any]:
         return self.simulation.info.one(self._views, self.simulation.falls[0])
 
-    def _begin_footage(self) -> None:
-        if self._renderer is not None:
-            self._footage = Footage(self.simulation)
-            self._show()
+    def _begin(self) -> None:
+        self.is_under_way = self._has_begun = True
+        self._frames = []
+        if self._gallery is not None:
+            self._gallery.restart(_ONE)
+            self._show(self._gallery)
 
-    def _show(self) -> None:
-        if self.render_mode == "human" and self._renderer and self._footage:
-            self._renderer.show(self._footage.scene(self._fall()), RENDER_FPS)
-
-    def _fall(self) -> str | None:
-        return FallCode(self.simulation.falls[0]).word
-
-
-def _action_of(keys: Iterable[str]) -> NDArray[np.float32]:
-    action = np.zeros(ACTION_SIZE, dtype=np.float32)
-    for key in keys:
-        action += np.array(_KEYS[key], dtype=np.float32)
-    return action
+    def _show(self, gallery: Gallery) -> None:
+        """Draw what is to be seen of the last step."""
+        walk = gallery.walk()
+        if self.render_mode == "rgb_array_list":
+            self._frames += [gallery.frame(share=share) for share in walk.shares()]
+        elif self.render_mode == "human":
+            for share in walk.shares():
+                gallery.renderer.show(walk.scene(share), FRAMES_PER_SECOND)

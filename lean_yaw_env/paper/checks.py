@@ -1,12 +1,21 @@
-"""A number or statement of the paper set beside ours, with a verdict."""
+"""Printed numbers and statements set beside ours, with a verdict, and what a piece of the report is made of.
+
+``printed.csv`` has what the paper prints: M. Wisse and A. L. Schwab, "Skateboards, Bicycles, and Three-dimensional
+Biped Walking Machines: Velocity-dependent Stability by Means of Lean-to-yaw Coupling", Int. J. Robotics
+Research 24 (2005) 417-429. ``classics.csv`` has what other publications print; "secondary" marks a number that
+was read elsewhere than in the publication itself. Dimensionless but for skateboard and bicycle, which are
+in SI units.
+"""
 
 from __future__ import annotations
 
+import csv
 import math
-from dataclasses import dataclass
-from typing import Literal
-
-from lean_yaw_env.paper.numbers import PaperNumber, Statement
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
 
 Verdict = Literal["agrees", "agrees within rounding", "differs", "open"]
 VERDICTS: tuple[Verdict, ...] = ("agrees", "agrees within rounding", "differs", "open")
@@ -18,7 +27,80 @@ VERDICTS: tuple[Verdict, ...] = ("agrees", "agrees within rounding", "differs", 
 knows why.
 """
 
+Columns = Mapping[str, Iterable[Any]]
+"""Equally long columns by their headings."""
+
 _ROUND_OFF = 1e-9
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A number or a statement as printed: a row of the tables.
+
+    Attributes
+    ----------
+    name : str
+        Unique.
+    printed : str
+        A number's digits, whose last place says how far it was rounded; a statement's words, shortened.
+    where : str
+        The place where it stands, and the source, if that is not the paper.
+    meaning : str
+    tolerance : float or None
+        Greatest difference of a number that agrees; None for half of the last printed digit.
+    allowed : str
+        Why a number has another tolerance; what has to hold for a statement to agree, where its words leave room.
+    is_open : bool
+        Whether a disagreement is unexplained.
+    remark, otherwise : str
+        What the report says in any case, and if the two disagree.
+    """
+
+    name: str
+    printed: str
+    where: str
+    meaning: str
+    tolerance: float | None = None
+    allowed: str = ""
+    is_open: bool = False
+    remark: str = ""
+    otherwise: str = ""
+
+    @property
+    def value(self) -> float:
+        return float(self.printed)
+
+    @property
+    def decimals(self) -> int:
+        """Digits behind the point."""
+        return len(self.printed.partition(".")[2])
+
+
+@cache
+def _rows() -> dict[str, Printed]:
+    found: dict[str, Printed] = {}
+    for table in ("printed.csv", "classics.csv"):
+        with Path(__file__).with_name(table).open(encoding="utf-8", newline="") as file:
+            for row in csv.DictReader(file):
+                found[row["name"]] = Printed(
+                    *(row[key] for key in ("name", "printed", "where", "meaning")),
+                    tolerance=float(row["tolerance"]) if row["tolerance"] else None,
+                    allowed=row["allowed"],
+                    is_open=bool(row["open"]),
+                    remark=row["remark"],
+                    otherwise=row["otherwise"],
+                )
+    return found
+
+
+def printed(name: str) -> Printed:
+    """What is printed under a name, or ``KeyError``."""
+    return _rows()[name]
+
+
+def names_of(beginning: str) -> list[str]:
+    """The names of the tables that begin so, in their order."""
+    return [name for name in _rows() if name.startswith(beginning)]
 
 
 @dataclass(frozen=True)
@@ -27,14 +109,10 @@ class Check:
 
     Attributes
     ----------
-    name : str
-        Unique within its piece.
-    where : str
-        The place in the paper.
-    statement : str
-        What the number is, or what the paper says.
-    paper, ours : str
-        As printed; ours with more digits.
+    name, where, statement, paper : str
+        What is printed, as in ``Printed``; ``statement`` is its meaning.
+    ours : str
+        What we find; a number with two digits more than the printed one.
     difference : float or None
         Ours less the paper's, where both are numbers.
     allowed : str
@@ -66,76 +144,136 @@ class Check:
         return self.verdict in ("agrees", "agrees within rounding")
 
 
-def compare(
-    number: PaperNumber, ours: float, *, remark: str = "", unless: str = "", is_open: bool = False
-) -> Check:
+def compare(row: Printed | str, ours: float, *, remark: str = "", otherwise: str = "") -> Check:
     """Compare a number with the printed one.
 
     Parameters
     ----------
-    number : PaperNumber
+    row : Printed or str
+        The printed number, or its name.
     ours : float
         In the paper's unit; nan where we find none.
-    remark : str
-        Said in any case.
-    unless : str
-        Said if the two disagree; the fallback names both numbers only.
-    is_open : bool
-        Whether a disagreement is unexplained.
+    remark, otherwise : str
+        In place of the row's.
+
+    Raises
+    ------
+    ValueError
+        If the row has a tolerance without a reason, or the other way round.
     """
-    difference = ours - number.value
-    if abs(difference) <= number.room * (1.0 + _ROUND_OFF) + _ROUND_OFF**2:
-        verdict: Verdict = "agrees within rounding" if number.tolerance is None else "agrees"
-    else:
-        verdict = "open" if is_open else "differs"
-    sentences = [remark] if remark else []
-    if verdict in ("differs", "open"):
-        sentences.append(unless or f"The paper has {number.printed}, we find {ours:.5g}.")
-    return Check(
-        name=number.name,
-        where=number.where,
-        statement=number.meaning,
-        paper=number.printed,
-        ours="none found" if math.isnan(ours) else significant(ours, number),
-        difference=None if math.isnan(ours) else difference,
-        allowed=number.allowed,
-        verdict=verdict,
-        remark=" ".join(sentences),
+    row = printed(row) if isinstance(row, str) else row
+    ours = float(ours)
+    if (row.tolerance is None) != (not row.allowed):
+        raise ValueError(f"number {row.name!r} needs a reason for its tolerance, and no other")
+    room = 0.5 * 10.0**-row.decimals if row.tolerance is None else row.tolerance
+    difference = ours - row.value
+    verdict: Verdict = "open" if row.is_open else "differs"
+    if abs(difference) <= room * (1.0 + _ROUND_OFF) + _ROUND_OFF**2:
+        verdict = "agrees within rounding" if row.tolerance is None else "agrees"
+    both = f"The paper has {row.printed}, we find {ours:.5g}."
+    none = math.isnan(ours)
+    return _check(
+        row,
+        "none found" if none else significant(ours, row.decimals),
+        None if none else difference,
+        f"± {room:.2g}: {row.allowed or 'half of the last printed digit'}",
+        verdict,
+        remark,
+        otherwise or row.otherwise or both,
     )
 
 
-def judge(
-    statement: Statement, holds: bool, *, ours: str, remark: str = "", unless: str = ""
+def compare_all(beginning: str, ours: Iterable[float], *, otherwise: str = "") -> list[Check]:
+    """Compare numbers with the printed ones whose names begin so, in the tables' order."""
+    pairs = zip(names_of(beginning), ours, strict=True)
+    return [compare(name, value, otherwise=otherwise) for name, value in pairs]
+
+
+def assess(
+    row: Printed | str, holds: bool, ours: str, *, remark: str = "", otherwise: str = ""
 ) -> Check:
-    """Judge a statement that is not one number.
+    """Say whether a printed statement holds.
 
     Parameters
     ----------
-    statement : Statement
+    row : Printed or str
+        The statement, or its name.
     holds : bool
     ours : str
         What we find, with its numbers.
-    remark : str
-        Said in any case.
-    unless : str
-        Said if it does not hold; one of the two is needed then.
+    remark, otherwise : str
+        In place of the row's.
     """
-    return Check(
-        name=statement.name,
-        where=statement.where,
-        statement=statement.meaning,
-        paper=statement.printed,
-        ours=ours,
-        difference=None,
-        allowed=statement.criterion,
-        verdict="agrees" if holds else "differs",
-        remark=" ".join(filter(None, [remark, "" if holds else unless])),
+    row = printed(row) if isinstance(row, str) else row
+    fallback = "" if remark or row.remark else "It does not hold."
+    verdict: Verdict = "agrees" if holds else "open" if row.is_open else "differs"
+    return _check(
+        row, ours, None, row.allowed, verdict, remark, otherwise or row.otherwise or fallback
     )
 
 
-def significant(ours: float, number: PaperNumber) -> str:
+def _check(
+    row: Printed,
+    ours: str,
+    difference: float | None,
+    allowed: str,
+    verdict: Verdict,
+    remark: str,
+    otherwise: str,
+) -> Check:
+    sentences = [remark or row.remark, otherwise if verdict in ("differs", "open") else ""]
+    return Check(
+        row.name,
+        row.where,
+        row.meaning,
+        row.printed,
+        ours,
+        difference,
+        allowed,
+        verdict,
+        " ".join(filter(None, sentences)),
+    )
+
+
+def significant(ours: float, decimals: int) -> str:
     """Ours with two digits more than are printed; a zero but for round-off as such."""
     if abs(ours) < _ROUND_OFF:
         return "0"
-    text = f"{ours:.{number.decimals + 2}f}"
+    text = f"{ours:.{decimals + 2}f}"
     return text if float(text) != 0.0 else f"{ours:.1e}"
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the report that no verdict sums up: what was tried, or a number of ours alone.
+
+    Attributes
+    ----------
+    title, text : str
+    table : Columns
+        Shown beneath; cells as they are to be read.
+    """
+
+    title: str
+    text: str
+    table: Columns = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Result:
+    """The reproduction of one piece of the paper.
+
+    Attributes
+    ----------
+    checks : sequence of Check
+    tables : mapping of file stems to columns
+        Written as one CSV file each.
+    picture : function or None
+        Writes the picture into a PNG file of the given path, whole or not at all.
+    sections : sequence of Section
+    """
+
+    checks: Iterable[Check] = ()
+    tables: Mapping[str, Columns] = field(default_factory=dict)
+    picture: Callable[[Path], None] | None = None
+    sections: tuple[Section, ...] = ()

@@ -9,26 +9,19 @@ import numpy as np
 
 from lean_yaw_env.kernel.passive import PassiveOutcome, passive_batch
 from lean_yaw_env.kernel.records import STEPPED, Body
-from lean_yaw_env.paper.results import Result, Section
+from lean_yaw_env.paper.checks import Result, Section
 from lean_yaw_env.paper.simplest_walker import gaits
 from lean_yaw_env.paper.walkers import point_foot_walker
 from lean_yaw_env.parameters import Vector
 
-_PITCH, _RATE, _SWING_RATE, _INTER_LEG, _STATUS, _DURATION = (
+_STATE = [
     PassiveOutcome._fields.index(name)
-    for name in (
-        "stance_pitch",
-        "stance_pitch_rate",
-        "inter_leg_rate",
-        "inter_leg_angle",
-        "status",
-        "duration",
-    )
-)
+    for name in ("stance_pitch", "stance_pitch_rate", "inter_leg_rate", "inter_leg_angle")
+]
+_STATUS, _DURATION = (PassiveOutcome._fields.index(name) for name in ("status", "duration"))
 _WIDTH = 1e-5
 """Half-width of central differences; their error is its square."""
 _SLOPES = (0.001, 0.002, 0.004, 0.006, 0.008, 0.01, 0.012, 0.014)
-_SLOPES_MFPT = (0.004, 0.009)
 _SURVIVED = 100
 """Steps that count as survived."""
 _WALKERS, _SETTLING, _COUNTED = 500, 20, 200
@@ -38,14 +31,10 @@ _ROUGHNESS = (0.0005, 0.001, 0.0015, 0.002)
 
 def uneven_ground() -> Result:
     """Both measures; no published number of either could be read for a model that ours covers."""
-    return Result(sections=(_norm_section(), _passage_section()))
-
-
-def _norm_section() -> Section:
     norms = [gait_sensitivity_norm(slope) for slope in _SLOPES]
     drops = [largest_drop(slope) for slope in _SLOPES]
     correlation = float(np.corrcoef(1.0 / np.array(norms), drops)[0, 1])
-    return Section(
+    norm_section = Section(
         "Gait sensitivity norm (Hobbelen and Wisse 2007)",
         "How much a small drop of the floor, in leg lengths, changes all later step times, in units of time: the "
         "smaller, the better are disturbances rejected. Beside it the largest single drop that the walker "
@@ -58,23 +47,18 @@ def _norm_section() -> Section:
             "largest drop survived": [f"{drop:.5f}" for drop in drops],
         },
     )
-
-
-def _passage_section() -> Section:
-    times = [[first_passage_time(slope, rough) for rough in _ROUGHNESS] for slope in _SLOPES_MFPT]
-    return Section(
+    table = {"standard deviation (rad)": [f"{rough:g}" for rough in _ROUGHNESS]}
+    for slope in (0.004, 0.009):
+        times = [first_passage_time(slope, rough) for rough in _ROUGHNESS]
+        table[f"steps at slope {slope:g}"] = [f"{time:.3g}" for time in times]
+    passage_section = Section(
         "Mean first-passage time (Byl and Tedrake 2009)",
         "Mean number of steps until a fall, where the angle from one foothold to the next is the slope's with a "
         f"normal deviation; from {_WALKERS} walkers over {_COUNTED} steps each. Byl and Tedrake's compass gait "
         "has legs with masses and an actuated hip, which ours has not; the numbers are ours alone.",
-        {
-            "standard deviation (rad)": [f"{rough:g}" for rough in _ROUGHNESS],
-            **{
-                f"steps at slope {slope:g}": [f"{value:.3g}" for value in row]
-                for slope, row in zip(_SLOPES_MFPT, times, strict=True)
-            },
-        },
+        table,
     )
+    return Result(sections=(norm_section, passage_section))
 
 
 class Steps(NamedTuple):
@@ -110,7 +94,7 @@ def uneven_steps(slope: float, states: Vector, changes: Vector) -> Steps:
     start[:, 1] += changes
     rows = np.empty((len(states), len(PassiveOutcome._fields)))
     passive_batch(bodies, start, states[:, 3].copy(), np.ones(len(states)), rows, 0, len(states))
-    after = rows[:, [_PITCH, _RATE, _SWING_RATE, _INTER_LEG]]
+    after = rows[:, _STATE]
     after[:, 0] -= changes
     return Steps(after, rows[:, _DURATION], rows[:, _STATUS] == STEPPED)
 

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 from lean_yaw_env.parameters import Vector, WalkerParameters
 
+NEAREST = 0.05
+"""Leg lengths in front of a camera from which on things are seen."""
+
 
 class Panel(NamedTuple):
     """A rectangle of the picture, in pixels from its upper left corner."""
@@ -84,29 +87,51 @@ def floor_camera(
 
 
 @dataclass(frozen=True, eq=False)
-class BodyCamera:
-    """Looks at the walker along a level line, without perspective; gravity points down on the picture.
+class PerspectiveCamera:
+    """Looks from ``eye`` (3,) along ``forward``; ``right``, ``up`` and ``forward`` (3,) are unit vectors in the floor frame.
 
-    ``right``, ``up`` and ``toward`` (3,) are unit vectors in the floor frame: rightward and upward on the picture, and to the viewer. The point
-    ``subject`` (3,) of space comes to ``place`` (2,) on the picture; ``scale`` is in pixels per leg length.
+    A length at distance one is ``focal`` times as many pixels.
     """
 
     panel: Panel
+    eye: Vector
     right: Vector
     up: Vector
-    toward: Vector
-    subject: Vector
-    place: Vector
-    scale: float
+    forward: Vector
+    focal: float
 
-    def pixels(self, points: Vector) -> Vector:
-        """Picture coordinates of points in space; shape (..., 3) to (..., 2)."""
-        offset = self.scale * (points - self.subject)
-        return self.place + np.stack([offset @ self.right, -(offset @ self.up)], axis=-1)
+    def seen(self, points: Vector) -> tuple[Vector, Vector]:
+        """Picture coordinates (n, 2) of points in space (n, 3), NaN behind the camera, and their distances (n,)."""
+        offset = points - self.eye
+        depth = offset @ self.forward
+        near = depth > NEAREST
+        share = self.focal / np.where(near, depth, np.nan)
+        aside = np.column_stack([share * (offset @ self.right), -share * (offset @ self.up)])
+        return self.panel.middle + aside, depth
 
-    def nearness(self, point: Vector) -> float:
-        """How far a point is on the viewer's side of the subject."""
-        return float((point - self.subject) @ self.toward)
+    def place(self, point: Vector) -> tuple[Vector, float]:
+        """Picture coordinates of a point, and the pixels of a leg length there."""
+        offset = point - self.eye
+        scale = self.focal / max(float(offset @ self.forward), NEAREST)
+        return self.panel.middle + scale * np.array(
+            [offset @ self.right, -(offset @ self.up)]
+        ), scale
+
+    def distance(self, point: Vector) -> float:
+        """From the eye."""
+        return float(np.linalg.norm(point - self.eye))
+
+    def on_floor(self, points: Vector) -> Vector:
+        """Picture coordinates of floor points, (downhill, right); of those in front of the camera only."""
+        places, _ = self.seen(np.insert(points, 1, 0.0, axis=1))
+        return places[np.isfinite(places).all(axis=1)]
+
+    def horizon(self) -> Vector:
+        """Where the floor ends at the panel's left and right edges, (2,), pixels from the picture's upper edge."""
+        # A direction is level with the floor where its second component is zero
+        across = np.array([self.panel.left, self.panel.right]) - self.panel.middle[0]
+        rise = (self.focal * self.forward[1] + across * self.right[1]) / self.up[1]
+        return self.panel.middle[1] + rise
 
 
 def upward(parameters: WalkerParameters, heading: float) -> Vector:
@@ -116,10 +141,12 @@ def upward(parameters: WalkerParameters, heading: float) -> Vector:
     return np.array([-sine * math.cos(falls_to), cosine, sine * math.sin(falls_to)])
 
 
-def body_camera(
-    panel: Panel, toward: Vector, up: Vector, subject: Vector, place: Vector, scale: float
-) -> BodyCamera:
-    """A camera on the side of ``toward``, made level; ``up`` is a unit vector."""
-    level = toward - (toward @ up) * up
-    level = level / np.linalg.norm(level)
-    return BodyCamera(panel, np.cross(up, level), up, level, subject, place, scale)
+def perspective_camera(
+    panel: Panel, eye: Vector, target: Vector, up: Vector, angle: float
+) -> PerspectiveCamera:
+    """A camera that looks from ``eye`` at ``target`` with ``up`` (unit vectors' frame: the floor's) upright; ``angle`` spans the lesser side, rad."""
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, up)
+    right = right / np.linalg.norm(right)
+    focal = 0.5 * min(panel.width, panel.height) / math.tan(0.5 * angle)
+    return PerspectiveCamera(panel, eye, right, np.cross(right, forward), forward, focal)

@@ -22,10 +22,12 @@ from lean_yaw_env.rendering.palette import (
     FOOT_COLOURS,
     GROUND,
     INK,
+    WHITE,
     Colour,
     mixed,
     unit_colour,
 )
+from lean_yaw_env.validation import require_instance
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,8 +38,7 @@ _LEAST_SLOPE = 0.09  # a gait's own slope would look level
 _INCHES = 2.9  # per leg length
 _HEIGHT = 1.45  # of each drawing, in leg lengths
 _AXIS_ABOVE, _AXIS_BELOW = 0.42, 0.14
-_WHITE: Colour = (255, 255, 255)
-_AXLE = mixed(INK, _WHITE, 0.3)
+_AXLE = mixed(INK, WHITE, 0.3)
 _RIGHT, _UP = np.array([1.0, 0.0]), np.array([0.0, 1.0])
 
 
@@ -54,6 +55,7 @@ def draw_walker(parameters: WalkerParameters, path: str | os.PathLike[str]) -> N
         If matplotlib is not installed.
     """
     require_ending(path, ENDINGS)
+    require_instance("parameters", parameters, WalkerParameters)
     widths = (1.7, 0.9 + parameters.hip_width, 1.0 + parameters.hip_width)
     figure = new_figure(_INCHES * sum(widths), _INCHES * _HEIGHT + 1.0)
     side, rear, top = figure.subplots(1, 3, width_ratios=widths)
@@ -186,15 +188,15 @@ def _draw_floor(axes: Axes, contact: Vector, along: Vector, back: float, front: 
 
 
 def _draw_leg(axes: Axes, view: Vector, leg: LegShape, fading: float) -> None:
-    colour = mixed(FOOT_COLOURS[leg.foot], _WHITE, fading)
-    pale = unit_colour(mixed(colour, _WHITE, 0.6))
+    colour = mixed(FOOT_COLOURS[leg.foot], WHITE, fading)
+    pale = unit_colour(mixed(colour, WHITE, 0.6))
     for arc in (leg.inner_arc, leg.outer_arc):
         axes.fill(*(arc @ view).T, color=pale, lw=0)
     sole = np.vstack([leg.inner_arc, leg.outer_arc[::-1]]) @ view
     axes.fill(*sole.T, facecolor=pale, edgecolor=unit_colour(colour))
     _line(axes, leg.ankle @ view, leg.hip @ view, colour, 4.5)
     below, above = leg.axis_ends(_AXIS_BELOW, _AXIS_ABOVE) @ view
-    _line(axes, above, below, mixed(ANKLE_AXIS, _WHITE, fading), 1.3, (0, (5, 2, 1, 2)))
+    _line(axes, above, below, mixed(ANKLE_AXIS, WHITE, fading), 1.3, (0, (5, 2, 1, 2)))
 
 
 def _line(

@@ -15,18 +15,16 @@ from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.files import require_ending, written_whole
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector
 from lean_yaw_env.rendering.geometry import Pose
-from lean_yaw_env.rendering.motion import (
-    SECONDS_PER_TIME_UNIT,
-    SWING_SHARE,
-    StepMotion,
-    swing_angle,
-)
+from lean_yaw_env.rendering.motion import SECONDS_PER_TIME_UNIT, SWING_SHARE, StepMotion
 from lean_yaw_env.rendering.pygame_renderer import SIZE, Renderer
 from lean_yaw_env.rendering.scene import Scene, status_lines
-from lean_yaw_env.validation import require_number
+from lean_yaw_env.validation import (
+    require_flag,
+    require_instance,
+    require_number,
+    require_one_or_each,
+)
 from lean_yaw_env.walker import Walk, Walker
-
-__all__ = ["SECONDS_PER_TIME_UNIT", "FilmFile", "Frame", "film", "swing_angle"]
 
 HOLD_SECONDS = 1.0
 """How long a film stays with a walker that has fallen."""
@@ -80,6 +78,8 @@ def film(
     gymnasium.error.DependencyNotInstalled
         If what writes such a file is not installed.
     """
+    require_instance("walker", walker, Walker)
+    require_flag("progress", progress)
     require_number("fps", fps, 1, 120)
     file = FilmFile(path, fps)
     require_number("seconds_per_time_unit", seconds_per_time_unit, 0.0, 100.0, "(]")
@@ -90,12 +90,7 @@ def film(
     walk = walker.walk(n_steps, **start, **command)
     commanded = None
     if commanded_heading is not None:
-        commanded = np.asarray(commanded_heading, dtype=float)
-        if commanded.shape not in ((), (n_steps,)):
-            raise ValueError(
-                f"commanded_heading must be one number or {n_steps}, got shape {commanded.shape}"
-            )
-        commanded = np.broadcast_to(commanded, n_steps)
+        commanded = require_one_or_each("commanded_heading", commanded_heading, n_steps)
     motions = _motions(walker, walk, swing_share)
     ends = np.cumsum([motion.duration for motion in motions])
     times = np.arange(0.0, ends[-1], 1.0 / (file.rate * seconds_per_time_unit))
@@ -107,7 +102,6 @@ def film(
 def _motions(walker: Walker, walk: Walk, swing_share: float) -> list[StepMotion]:
     """The motion within each step, the unfinished one of a fall included."""
     motions: list[StepMotion] = []
-    previous_angle = None
     for i, (angle, offset) in enumerate(walk.commands.tolist()):
         state, foot, before = walk.states[i], walk.stances[i], float(walk.mass_offsets[i])
         command = {"inter_leg_angle": angle, "mass_offset": offset}
@@ -115,18 +109,10 @@ def _motions(walker: Walker, walk: Walk, swing_share: float) -> list[StepMotion]
             duration = float(walk.durations[i])
         else:
             duration = walker.step(state, stance=foot, previous_offset=before, **command).duration
-        pose = Pose(state, foot, mass_offset=before, contact=walk.footprints[i])
-        motions.append(
-            StepMotion(
-                walker,
-                pose,
-                duration=duration,
-                previous_angle=previous_angle,
-                swing_share=swing_share,
-                **command,
-            )
-        )
-        previous_angle = angle
+        comes_from = -walk.commands[i - 1, 0] if i else angle  # at first it is in front
+        pose = Pose(state, foot, comes_from, before, walk.footprints[i])
+        motion = StepMotion(walker, pose, duration=duration, swing_share=swing_share, **command)
+        motions.append(motion)
     return motions
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -26,13 +25,11 @@ class StepMotion:
     ----------
     walker : Walker
     start : Pose
-        Just after the heel strike, with the mass offset then in force.
+        Just after the heel strike, with the mass offset then in force, and the swing leg where it comes from.
     inter_leg_angle, mass_offset : float
         Commanded for this step.
     duration : float
         Of the step.
-    previous_angle : float, optional
-        Inter-leg angle of the step before, from which the swing leg comes; without one it is in front from the start.
     swing_share : [0, 1]
         Share of the step in which the swing leg is drawn on its way to the front. The model has it there at once: massless, it acts on nothing.
     """
@@ -45,13 +42,10 @@ class StepMotion:
         inter_leg_angle: float,
         mass_offset: float,
         duration: float,
-        previous_angle: float | None = None,
         swing_share: float = SWING_SHARE,
     ) -> None:
         self._start = start
-        self._angles = [inter_leg_angle]
-        if previous_angle is not None:
-            self._angles.insert(0, previous_angle)
+        self._angles = start.inter_leg_angle, inter_leg_angle
         self._swing_share = swing_share
         self.duration = max(duration, 1e-6)  # a fall at the start of a step lasts no time
         motion = walker.stance_motion(
@@ -75,9 +69,7 @@ class StepMotion:
         return Pose(
             state=np.array([self._start.state[0], pitch, ankle, 0.0, 0.0]),
             stance=self._start.stance,
-            inter_leg_angle=swing_angle(
-                self._angles, len(self._angles) - 1, share, self._swing_share
-            ),
+            inter_leg_angle=self._inter_leg_angle(share),
             mass_offset=offset,
             contact=self._start.contact,
         )
@@ -86,13 +78,10 @@ class StepMotion:
         """The centre of mass so far, (downhill, right); shape (k, 2)."""
         return self._centre[: math.floor(share * (_SAMPLES - 1)) + 1]
 
-
-def swing_angle(
-    angles: Sequence[float] | Vector, i: int, share: float, swing_share: float
-) -> float:
-    """The inter-leg angle as drawn in step ``i``: from where the old stance leg was left to the front."""
-    if i == 0 or share >= swing_share:
-        return float(angles[i])
-    s = share / swing_share
-    blend = s * s * s * (10.0 + s * (6.0 * s - 15.0))
-    return float(-angles[i - 1] + blend * (angles[i] + angles[i - 1]))
+    def _inter_leg_angle(self, share: float) -> float:
+        """As drawn: from where the swing leg comes from to the front."""
+        start, end = self._angles
+        if share >= self._swing_share:
+            return end
+        s = share / self._swing_share
+        return start + s * s * s * (10.0 + s * (6.0 * s - 15.0)) * (end - start)

@@ -1,4 +1,4 @@
-"""Colours of pictures and films, chosen so that readers with any kind of colour blindness can tell them apart."""
+"""Colours of pictures, films and the web page, chosen so that readers with any kind of colour blindness can tell them apart."""
 
 from __future__ import annotations
 
@@ -6,17 +6,20 @@ from lean_yaw_env.parameters import Foot
 
 Colour = tuple[int, int, int]
 
+WHITE: Colour = (255, 255, 255)
 BACKGROUND: Colour = (236, 234, 228)
-FLOOR: Colour = (250, 249, 246)
-SKY: Colour = (250, 249, 246)
+FLOOR: Colour = (246, 244, 238)
+HORIZON: Colour = (239, 240, 238)
+ZENITH: Colour = (185, 210, 228)
 GROUND: Colour = (221, 216, 205)
 GRID: Colour = (232, 229, 222)
 STRONG_GRID: Colour = (214, 210, 200)
 INK: Colour = (43, 45, 52)
-FAINT_INK: Colour = (124, 125, 128)
+FAINT_INK: Colour = (99, 100, 106)
 LEFT: Colour = (37, 110, 178)
 RIGHT: Colour = (214, 104, 37)
 PATH: Colour = (92, 94, 102)
+STEEL: Colour = (201, 204, 209)
 COMMAND: Colour = (22, 142, 104)
 ANKLE_AXIS: Colour = (190, 38, 92)
 GOAL: Colour = (222, 168, 30)

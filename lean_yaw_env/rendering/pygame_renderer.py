@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lean_yaw_env.extras import needs_extra
-from lean_yaw_env.rendering.body_views import draw_rear_view, draw_side_view
 from lean_yaw_env.rendering.camera import Panel
 from lean_yaw_env.rendering.canvas import Canvas
 from lean_yaw_env.rendering.geometry import walker_shape
 from lean_yaw_env.rendering.palette import BACKGROUND
+from lean_yaw_env.rendering.perspective import draw_perspective_view
 from lean_yaw_env.rendering.scene import Scene
 from lean_yaw_env.rendering.top_view import draw_top_view
-from lean_yaw_env.validation import require_count, require_number
+from lean_yaw_env.validation import require_count, require_instance, require_number
 
 SIZE = (960, 540)
 """Width and height of a picture, pixels."""
@@ -28,7 +28,7 @@ _TOP_SHARE = 0.585  # of the width, for the view from above
 
 
 class Renderer:
-    """Draws scenes: from above on the left, from the side and from behind on the right.
+    """Draws scenes: from above on the left, and in perspective on the right.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Renderer:
 
     def frame(self, scene: Scene) -> NDArray[np.uint8]:
         """The picture of a scene; shape (height, width, 3), uint8. Needs and opens no display."""
-        self._draw(scene)
+        self._draw(require_instance("scene", scene, Scene))
         return self._canvas.array()
 
     def show(self, scene: Scene, fps: float = 30.0) -> bool:
@@ -69,6 +69,7 @@ class Renderer:
             If there is no display; ``frame`` needs none.
         """
         rate = require_number("fps", fps, 0.0, 1000.0, "(]")
+        require_instance("scene", scene, Scene)
         if self._closed_by_user:
             return False
         window = self._opened_window()
@@ -107,24 +108,13 @@ class Renderer:
         return self._window
 
     def _draw(self, scene: Scene) -> None:
-        top, side, rear = _panels(self.size)
+        width, height = self.size
+        split = round(_TOP_SHARE * width)
         shape = walker_shape(scene.parameters, scene.pose)
         self._canvas.clear()
-        draw_top_view(self._canvas, top, scene, shape)
-        draw_side_view(self._canvas, side, scene, shape)
-        draw_rear_view(self._canvas, rear, scene, shape)
-
-
-def _panels(size: tuple[int, int]) -> tuple[Panel, Panel, Panel]:
-    width, height = size
-    split = round(_TOP_SHARE * width)
-    middle = round(0.5 * height)
-    rest = width - split - _GAP
-    return (
-        Panel(0.0, 0.0, split, height),
-        Panel(split + _GAP, 0.0, rest, middle - 0.5 * _GAP),
-        Panel(split + _GAP, middle + 0.5 * _GAP, rest, height - middle - 0.5 * _GAP),
-    )
+        draw_top_view(self._canvas, Panel(0.0, 0.0, split, height), scene, shape)
+        beside = Panel(split + _GAP, 0.0, width - split - _GAP, height)
+        draw_perspective_view(self._canvas, beside, scene, shape)
 
 
 def _require_size(size: tuple[int, int]) -> tuple[int, int]:

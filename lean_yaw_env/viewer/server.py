@@ -21,6 +21,12 @@ _NAMES = {LOOPBACK, "localhost"}
 _WALK = "/walk.json"
 
 
+def require_built() -> None:
+    """Raise ``FileNotFoundError`` if there is no built page."""
+    if not (PAGE / "index.html").is_file():
+        raise FileNotFoundError(f"{PAGE} holds no built page: run npm run build in web")
+
+
 class _Handler(SimpleHTTPRequestHandler):
     """Files of the page, and one walk. Lists no folders, and answers only to this machine's own names."""
 
@@ -80,8 +86,7 @@ class PageServer:
     """
 
     def __init__(self, walk: str | Path | None = None, *, port: int = 0) -> None:
-        if not (PAGE / "index.html").is_file():
-            raise FileNotFoundError(f"{PAGE} holds no built page: run npm run build in web")
+        require_built()
         place = None if walk is None else Path(walk).resolve()
         if place is not None and not place.is_file():
             raise FileNotFoundError(f"no walk at {place}")

@@ -1,15 +1,20 @@
-"""The tasks, loaded by name: each is compiled only when it is used."""
+"""The tasks by name; each is compiled when it is first used."""
 
 from __future__ import annotations
 
-import importlib
-
+from lean_yaw_env.envs.tasks.headings import HEADING, LEVEL, SPEED_HEADING, UTURN
+from lean_yaw_env.envs.tasks.slalom import SLALOM
 from lean_yaw_env.envs.tasks.task import Command, Feature, Formula, Metric, Task
-from lean_yaw_env.registration import ALL_TASKS, TASK_IDS, name_of_task, register_id
-from lean_yaw_env.validation import suggestion
+from lean_yaw_env.envs.tasks.walking import PUSH, WALK
+from lean_yaw_env.envs.tasks.waypoints import WAYPOINT, WAYPOINT_GOAL
+from lean_yaw_env.registration import name_of_task, register_id
+from lean_yaw_env.validation import require_instance, suggestion
 
-_REGISTERED: dict[str, Task] = {}
-"""Tasks of other packages, by name."""
+TASKS = {
+    task.name: task
+    for task in (HEADING, WALK, SPEED_HEADING, WAYPOINT, SLALOM, PUSH, UTURN, LEVEL, WAYPOINT_GOAL)
+}
+"""Those of this package and of others (``register_task``)."""
 
 
 def task_named(task: str | Task) -> Task:
@@ -23,14 +28,11 @@ def task_named(task: str | Task) -> Task:
     if isinstance(task, Task):
         return task
     name = name_of_task(task)
-    if name in _REGISTERED:
-        return _REGISTERED[name]
-    if name not in ALL_TASKS:
-        known = (*ALL_TASKS, *_REGISTERED)
+    if not isinstance(name, str) or name not in TASKS:
         raise ValueError(
-            f"task must be one of {', '.join(known)}, got {task!r}{suggestion(task, known)}"
+            f"task must be one of {', '.join(TASKS)}, got {task!r}{suggestion(task, TASKS)}"
         )
-    return importlib.import_module(f"{__name__}.{name.lower()}").TASK
+    return TASKS[name]
 
 
 def register_task(task: Task, env_id: str, *, reward_threshold: float | None = None) -> None:
@@ -47,16 +49,16 @@ def register_task(task: Task, env_id: str, *, reward_threshold: float | None = N
     Raises
     ------
     ValueError
-        If another task has that name.
+        If another task has that name, or ``env_id`` is not of that form.
     """
-    if task.name in ALL_TASKS or _REGISTERED.get(task.name, task) is not task:
+    if TASKS.get(require_instance("task", task, Task).name, task) is not task:
         raise ValueError(f"name must be a task's own, got {task.name!r}, which there is already")
-    _REGISTERED[task.name] = task
     register_id(env_id, task.name, reward_threshold=reward_threshold)
+    TASKS[task.name] = task
 
 
 __all__ = [
-    "TASK_IDS",
+    "TASKS",
     "Command",
     "Feature",
     "Formula",

@@ -18,9 +18,8 @@ from lean_yaw_env.parameters import Vector
 WAVES = 3
 SHORTEST_WAVE, LONGEST_WAVE = 12.0, 80.0  # leg lengths
 LEAST_SLOPE, GREATEST_SLOPE = 0.2, 0.8  # of all waves together, where all are steepest
-GREATEST_CURVATURE = (
-    0.08  # of all waves together; the walker turns by 0.12 with the largest offset held
-)
+# Of all waves together; the walker turns by 0.12 with the largest offset held.
+GREATEST_CURVATURE = 0.08
 _LOG_SHORTEST, _LOG_LONGEST = log(SHORTEST_WAVE), log(LONGEST_WAVE)
 LARGEST_ERROR = 3.0  # leg lengths; beyond it the episode ends
 
@@ -125,7 +124,7 @@ def reference_path(walker: Any, task: Any) -> Vector:
     return np.column_stack([downhill, path_right(task, downhill)])
 
 
-TASK = Task(
+SLALOM = Task(
     name="Slalom",
     fields=(
         Field("wave_numbers", "rad / leg length", "of the path's waves", size=WAVES),
@@ -177,7 +176,6 @@ TASK = Task(
     f"slopes to {GREATEST_SLOPE} and curvature to {GREATEST_CURVATURE}, under pushes.",
     reward_text=f"{WALKING_RATE} + {TRACKING_RATE} / (1 + (cross-track error / {TRACKING_WIDTH})^2) - {EFFORT_RATE} effort",
     ends=f"a cross-track error beyond {LARGEST_ERROR:g}, as a termination without reward",
-    history=("0: the first.",),
     reference_path=reference_path,
     push_level=0.2,
 )

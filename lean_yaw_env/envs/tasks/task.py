@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -10,16 +10,44 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from lean_yaw_env.envs.derivatives import differentiate, differentiation_tables
-from lean_yaw_env.envs.info import info_report, infos_of
-from lean_yaw_env.envs.judging import judge, no_features, no_refresh, no_start, no_update
-from lean_yaw_env.envs.observation import COMMON_CENTRES, COMMON_ODD, COMMON_SCALES
 from lean_yaw_env.envs.state import WALKER_FIELDS, Field, Records, record_type
-from lean_yaw_env.kernel.compilation import entry_point_with
-from lean_yaw_env.parameters import Vector, WalkerParameters
+from lean_yaw_env.kernel.compilation import formula
+from lean_yaw_env.parameters import Range, Vector, WalkerParameters
+from lean_yaw_env.validation import require_instance, require_mapping
 
 Formula = Callable[[Any, Any], Any]
 """Of a walker's record and the task's; decorated by ``formula``."""
+
+
+@formula
+def draw_nothing(walker: Any, task: Any) -> None:
+    """The start of a task without anything random."""
+
+
+@formula
+def go_on(walker: Any, task: Any) -> bool:
+    """The update of a task that sums nothing up and ends no episode."""
+    return False
+
+
+@formula
+def derive_nothing(walker: Any, task: Any) -> None:
+    """The refresh of a task without derived fields."""
+
+
+@formula
+def observe_nothing(walker: Any, task: Any) -> Any:
+    """The features of a task that has none."""
+    return ()
+
+
+TASK_RANGES = (
+    Range("horizon", 0.0, math.inf, "(]"),
+    Range("max_offset_change", 0.0, 2.0),
+    Range("push_level", 0.0, 10.0),
+)
+"""Of the options that have a default of each task's own."""
+_PUMPING, _GOAL_RADIUS = Range("pumping", -1.0, 1.0), Range("goal_radius", 0.0, math.inf, "()")
 
 
 class Feature(NamedTuple):
@@ -39,8 +67,8 @@ class Feature(NamedTuple):
 class Metric(NamedTuple):
     """One number of an episode's result, apart from reward: a field, or a quotient of two (0 over 0 is 0), of the walker's record or the task's.
 
-    ``better`` is the direction that an agent is to be judged by; None for what only describes an episode. ``is_share`` says that it is 0 or 1
-    for an episode, so that a share is all there is to tell of many.
+    ``better`` is the direction in which agents are compared; None for what only describes an episode. ``is_share`` says that it is 0 or 1
+    for an episode, so that many episodes have a share.
     """
 
     field: str
@@ -66,77 +94,85 @@ class Task:
     Its formulas take a walker's record (``envs.state.WALKER_FIELDS``) and the task's own. ``reward`` and ``features`` change nothing. They, and
     ``refresh``, take complex numbers too, whose imaginary parts carry a derivative: their decisions look at real parts (``x.real``).
 
-    Attributes
-    ----------
-    name : str
-        The middle of its environment id.
-    reward : of a step that was no fall, from records after the step and before ``update``
-    metrics : success metrics, apart from reward
-    summary, reward_text, history : str
-        For the documents: what is asked, the reward's rate per unit of time, and a sentence for each version.
-    fields : the task's record, each field at its initial value before ``start``
-    start : draws what the episode asks
-    update : keeps the account of a step and draws what the next one asks; returns whether the episode ends
-    refresh : renews fields that derive from others, after each start, each step, and records set by hand
-    features : a tuple, what the task appends to the observation, not mirrored or scaled yet
-    observed : what those features are
-    ends : str
-        For the documents: what ends an episode apart from a fall and the horizon.
-    commands : reset options that set a command
-    heading_field : field with the commanded heading, if there is one; pictures show it
-    goal_fields : fields with the place (downhill, right) of a goal to be reached within ``goal_radius``
-    reference_path : the path to be followed, as points (k, 2) on the floor, from a walker's record and the task's
-    parameters, horizon, max_offset_change, push_level : defaults of the environment
-    pumping : float
-        Episodes start in the gait driven by this offset, away from the stance foot; 0 is the gait that the slope drives.
-    headline : the metric, or "return", by which agents are compared: it must say enough without a look at survival
-
     Raises
     ------
     ValueError
-        If a metric or a command names a field that there is not, or a field has the name of one of the walker's.
+        If a value is outside its range, a metric or a command names a field that there is not, or a field has the name of one of the
+        walker's.
     """
 
     name: str
+    """The middle of its environment id."""
     reward: Formula
+    """Of a step that was no fall, from records after the step and before ``update``."""
     metrics: dict[str, Metric]
+    """Success metrics, apart from reward."""
     summary: str
+    """For the documents: what the walker must do."""
     reward_text: str
-    history: tuple[str, ...]
+    """For the documents: the reward's rate per unit of time."""
+    history: tuple[str, ...] = ("0: the first.",)
+    """For the documents: a sentence for each version."""
     fields: tuple[Field, ...] = ()
-    start: Formula = no_start
-    update: Formula = no_update
-    refresh: Formula = no_refresh
-    features: Formula = no_features
+    """The task's record, each field at its initial value before ``start``."""
+    start: Formula = draw_nothing
+    """Draws what is random in an episode."""
+    update: Formula = go_on
+    """Adds a step to the sums and draws the next command; returns whether the episode ends."""
+    refresh: Formula = derive_nothing
+    """Renews fields that derive from others, after each start, each step, and records set by hand."""
+    features: Formula = observe_nothing
+    """A tuple, which the task appends to the observation, not mirrored or scaled yet."""
     observed: tuple[Feature, ...] = ()
+    """What those features are."""
     ends: str = ""
+    """For the documents: what ends an episode apart from a fall and the horizon."""
     commands: dict[str, Command] = field(default_factory=dict)
+    """Reset options that set a command."""
     heading_field: str | None = None
+    """Field with the commanded heading, if there is one; pictures show it."""
     goal_fields: tuple[str, str] | None = None
+    """Fields with the place (downhill, right) of a goal to be reached within ``goal_radius``."""
     goal_radius: float = 0.5
     reference_path: Callable[[Any, Any], Vector] | None = None
+    """The path to be followed, as points (k, 2) on the floor, from a walker's record and the task's."""
     parameters: WalkerParameters = field(default_factory=WalkerParameters)
     horizon: float = 200.0
     max_offset_change: float = 0.005
     push_level: float = 0.0
     pumping: float = 0.0
+    """Episodes start in the gait driven by this offset, away from the stance foot; 0 is the gait that the slope drives."""
     headline: str = "return"
+    """The metric, or "return", by which agents are compared: it must be meaningful without survival."""
 
     def __post_init__(self) -> None:
+        for name in ("metrics", "commands"):
+            require_mapping(name, getattr(self, name))
+        if not all(
+            isinstance(each, Field) for each in require_instance("fields", self.fields, tuple)
+        ):
+            raise ValueError(f"fields must be of the class Field, got {self.fields!r}")
+        require_instance("parameters", self.parameters, WalkerParameters)
+        for limits in (*TASK_RANGES, _PUMPING, _GOAL_RADIUS):
+            limits.require(getattr(self, limits.name))
         common = {field.name for field in WALKER_FIELDS}
         own = {field.name for field in self.fields}
         if common & own:
             raise ValueError(
                 f"fields must not have names of the walker's record, got {', '.join(sorted(common & own))}"
             )
-        named = [
-            name for metric in self.metrics.values() for name in (metric.field, metric.divisor)
-        ]
-        named += [name for command in self.commands.values() for name in command.fields]
-        named += [self.heading_field, *(self.goal_fields or ())]
-        for name in named:
-            if name is not None and name not in common | own:
-                raise ValueError(f"task {self.name} names a field that it has not: {name!r}")
+        named = {
+            "heading_field": [self.heading_field],
+            "goal_fields": require_instance("goal_fields", self.goal_fields or (), tuple),
+            "metrics": [name for metric in self.metrics.values() for name in metric[:2]],
+            "commands": [name for command in self.commands.values() for name in command.fields],
+        }
+        for where, names in named.items():
+            for name in names:
+                if name is not None and name not in common | own:
+                    raise ValueError(
+                        f"{where} must name fields of the task {self.name}, got {name!r}"
+                    )
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Task, tuple(getattr(self, each.name) for each in fields(self))
@@ -154,17 +190,6 @@ class Task:
             record[each.name] = each.initial
         return record
 
-    @cached_property
-    def judge(self) -> Any:
-        """The compiled ``judging.judge`` of this task; tasks of the same formulas and tables share one."""
-        return self._compiled(judge, ("pay", "observe"), REPORT=info_report(self))
-
-    @cached_property
-    def differentiate(self) -> Any:
-        """The compiled ``derivatives.differentiate`` of this task."""
-        tables = differentiation_tables(self.fields)
-        return self._compiled(differentiate, ("read_observation",), **tables)
-
     def measure(
         self, walkers: Records, tasks: Records, undefined: float = 0.0
     ) -> dict[str, Vector]:
@@ -172,45 +197,12 @@ class Task:
         found: dict[str, Vector] = {}
         for key, metric in self.metrics.items():
             values = _numbers(metric.field, walkers, tasks)
+            found[key] = values
             if metric.divisor is not None:
                 divisors = _numbers(metric.divisor, walkers, tasks)
                 found[key] = np.full(len(values), undefined)
                 np.divide(values, divisors, out=found[key], where=divisors > 0.0)
-            else:
-                found[key] = values
         return found
-
-    def _compiled(self, template: Callable[..., Any], parts: tuple[str, ...], **more: Any) -> Any:
-        """The template with this task's formulas and tables; tasks that have the same ones share what is compiled."""
-        formulas = {
-            "TASK_START": self.start,
-            "TASK_REWARD": self.reward,
-            "TASK_UPDATE": self.update,
-            "TASK_REFRESH": self.refresh,
-            "TASK_FEATURES": self.features,
-        }
-        tables = {
-            "CENTRES": (*COMMON_CENTRES, *(feature.centre for feature in self.observed)),
-            "SCALES": (*COMMON_SCALES, *(feature.scale for feature in self.observed)),
-            "ODD": (*COMMON_ODD, *(feature.is_odd for feature in self.observed)),
-        }
-        contents = (
-            [each[:5] for each in self.fields],
-            tables,
-            [info[:2] for info in infos_of(self)],
-        )
-        key = (template, *formulas.values(), repr(contents))
-        if key not in _COMPILED:
-            names = [f"{each.__module__}.{each.__qualname__}" for each in formulas.values()]
-            digest = hashlib.sha256(repr((names, contents)).encode()).hexdigest()
-            _COMPILED[key] = entry_point_with(
-                template, digest[:16], formulas, parts, **tables, **more
-            )
-        return _COMPILED[key]
-
-
-_COMPILED: dict[tuple[Any, ...], Any] = {}
-"""Entry points by template, formulas and tables."""
 
 
 def _numbers(name: str, walkers: Records, tasks: Records) -> Vector:

@@ -1,0 +1,90 @@
+"""Files that hold every episode of an evaluated agent, so that it can be compared elsewhere; see docs/enter_your_agent.md."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.files import read_json, write_text
+from lean_yaw_env.parameters import Vector
+
+from ..policies.policy import package_versions
+from ..policies.policy_files import options_to_plain, require_env_id, task_of
+from ..registry import env_id_of
+from ..seeds import EpisodeSet
+from .episodes import RETURN, SPEED, Episodes, Results
+
+FORMAT, FORMAT_VERSION = "lean-yaw-results", 1
+
+
+def write_results(results: Results, folder: Path, episode_set: EpisodeSet, seed: int) -> Path:
+    """Write ``<Task>-<agent>.json`` into a folder, which is made if it does not exist; return the file."""
+    folder.mkdir(parents=True, exist_ok=True)
+    record = {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "env_id": env_id_of(results.task),
+        "agent": results.agent,
+        "options": options_to_plain(results.options),
+        "episode_set": episode_set,
+        "seed": seed,
+        "seconds": results.seconds,
+        "versions": package_versions(),
+        "trainings": [
+            {
+                "survived": run.survived.tolist(),
+                "metrics": {name: _plain(values) for name, values in run.metrics.items()},
+            }
+            for run in results.runs
+        ],
+    }
+    path = folder / f"{results.task}-{results.agent}.json"
+    write_text(path, json.dumps(record, allow_nan=False) + "\n")
+    return path
+
+
+def read_results(path: Path, episode_set: EpisodeSet, seed: int) -> Results:
+    """Read what ``write_results`` wrote of episodes under the environment's own options.
+
+    Raises
+    ------
+    ValueError
+        If the file is damaged, or of another format, environment, set of episodes or seed.
+    """
+    record = read_json(path)
+    wanted = {
+        "format": FORMAT, "format_version": FORMAT_VERSION, "options": {}, "episode_set": episode_set, "seed": seed,
+    }  # fmt: skip
+    for key, value in wanted.items():
+        if not isinstance(record, dict) or record.get(key) != value:
+            found = record.get(key) if isinstance(record, dict) else record
+            raise ValueError(f"{key} in {str(path)!r} must be {value!r}, got {found!r}")
+    try:
+        runs = tuple(
+            Episodes(
+                np.array(run["survived"], dtype=np.bool_),
+                {name: np.array(each, dtype=float) for name, each in run["metrics"].items()},
+            )
+            for run in record["trainings"]
+        )
+        task = task_of(require_env_id(record["env_id"]))
+        metrics = {RETURN, *task_named(task).metrics, SPEED}
+        if any(
+            set(run.metrics) != metrics
+            or any(each.shape != run.survived.shape for each in run.metrics.values())
+            for run in runs
+        ):
+            raise ValueError(
+                f"{str(path)!r} must hold {', '.join(sorted(metrics))} of every episode"
+            )
+        return Results(task, record["agent"], runs, seconds=float(record["seconds"]))
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"{str(path)!r} is damaged: {error}") from error
+
+
+def _plain(values: Vector) -> list[Any]:
+    return [value if np.isfinite(value) else None for value in values.tolist()]
