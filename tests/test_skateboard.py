@@ -196,5 +196,7 @@ def test_motion_beyond_floating_point_is_refused():
 
 
 def test_unknown_vehicle_has_no_critical_speed():
-    with pytest.raises(TypeError, match="vehicle must be of a class with a known stable speed range"):
+    with pytest.raises(
+        TypeError, match="vehicle must be of a class with a known stable speed range"
+    ):
         critical_speed("tricycle")

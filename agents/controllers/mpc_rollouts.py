@@ -75,7 +75,7 @@ class Rollouts:
             plans[:, step, _OFFSET] *= self._signs(copies)
             copies.actions[:] = actions
             copies.step_many(ended, 0, n)
-            ended |= copies.terminated | copies.truncated
+            ended |= copies.ends.any(axis=0)
         return plans
 
     def worth(self, plans: Vector, block: NDArray[np.int64]) -> Vector:
@@ -104,14 +104,15 @@ class Rollouts:
     ) -> None:
         """Take a step into the account; one that the solver gave up counts as a fall."""
         settings, walkers = self._settings, copies.walkers
-        falls = account.live & copies.terminated
+        terminated, truncated = copies.ends
+        falls = account.live & terminated
         rewards = copies.rewards - settings.step_price
         account.worth += np.where(account.live, rewards, 0.0) - settings.fall * falls
         account.rewards[step % 2, account.live] = rewards[account.live]
         account.durations[step % 2, account.live] = walkers["duration"][account.live]
         elapsed = walkers["time"] - account.start
         window = np.minimum(settings.window, copies.settings["horizon"] - account.start)
-        ends = (elapsed >= window) | copies.truncated | is_last
+        ends = (elapsed >= window) | truncated | is_last
         if not settings.scenarios:
             ends |= walkers["counter"] > 0  # the task drew something
         ends &= account.live & ~falls

@@ -323,7 +323,9 @@ def _planar_guess(section_map: ActiveMap) -> Vector:
     if offset != 0.0 and not parameters.slope_turns:
         sine = -offset / math.tan(parameters.slope or math.inf)
         heading = math.asin(sine) if abs(sine) < 1.0 else math.nan
-    rate = planar_gait_rate(section_map.walker, section_map.inter_leg_angle, heading)
+    rate = planar_rate(
+        parameters.foot_radius, parameters.slope, section_map.inter_leg_angle, heading
+    )
     if math.isnan(rate):
         raise NoGaitError(
             "the planar gait has no closed form here: the slope gives no energy along any heading "

@@ -75,6 +75,25 @@ def require_axis(
     return array
 
 
+def free_memory() -> float:
+    """Bytes of memory that are free; infinity where the system does not say."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            return 1024.0 * next(int(line.split()[1]) for line in file if "MemAvailable" in line)
+    except (OSError, StopIteration, ValueError):
+        return math.inf
+
+
+def require_memory(name: str, points: int, each: float) -> None:
+    """``ValueError`` unless there is memory for so many points of ``each`` bytes."""
+    wanted, free = points * each, free_memory()
+    if wanted > free:
+        raise ValueError(
+            f"{name} must have points that fit into memory, got {points:,}, which take about {wanted / 1e9:,.1f} GB of the {free / 1e9:,.1f} GB "
+            "that are free; compute parts of the grid, each with a file of its own"
+        )
+
+
 def progress_bar(name: str, shown: bool, total: int | None = None) -> Any:
     """A bar to ``update`` and ``close``, drawn where that is wanted and tqdm, an optional dependency, is installed."""
     if shown:
