@@ -121,6 +121,7 @@ class Evaluation:
 
     def __post_init__(self) -> None:
         require_count("processes", self.processes, 1, 1024)
+        require_count("costly_episodes", self.costly_episodes, 1, MOST_EPISODES)
 
     def candidates(self, tasks: Sequence[str], names: Sequence[str]) -> list[Candidate]:
         """Agents of the registry for tasks; all that there are for a task, in the registry's order, if none is named.
