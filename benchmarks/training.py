@@ -54,24 +54,19 @@ class Clock(BaseCallback):
         self.updates.append(self._lap())
 
 
-def model_of(env: VecEnv, settings: PPOSettings, steps: int) -> PPO:
-    """PPO at an environment's settings, but for rollouts of ``steps``."""
-    samples = env.num_envs * steps
-    return PPO(
+def learn(env: VecEnv, settings: PPOSettings, steps: int, rollouts: int) -> tuple[PPO, Clock]:
+    """Train for some rollouts of ``steps`` at the task's other settings; the first rollout is left out as it warms up."""
+    model = PPO(
         "MlpPolicy",
         env,
         n_steps=steps,
-        batch_size=min(settings.batch_size, samples),
+        batch_size=min(settings.batch_size, env.num_envs * steps),
         n_epochs=settings.epochs,
         policy_kwargs={"net_arch": list(settings.hidden)},
         device="cpu",
         seed=0,
     )
-
-
-def learn(env: VecEnv, settings: PPOSettings, steps: int, rollouts: int) -> tuple[PPO, Clock]:
-    """Train for some rollouts, the first of which is left out as it warms up."""
-    model, clock = model_of(env, settings, steps), Clock()
+    clock = Clock()
     model.learn(env.num_envs * steps * (rollouts + 1), clock)
     del clock.rollouts[0], clock.updates[0]
     return model, clock
@@ -80,24 +75,18 @@ def learn(env: VecEnv, settings: PPOSettings, steps: int, rollouts: int) -> tupl
 def _parts(model: PPO, env: WalkerVecEnv, effort: Effort) -> dict[str, float]:
     """Seconds of one step of all walkers: the kernel alone, the environment's step, the policy's forward pass."""
     observations = torch.as_tensor(env.reset())
-    actions = np.zeros((env.num_envs, 2), dtype=np.float32)
 
     def forward() -> Any:
         with torch.no_grad():
             return model.policy.forward(observations)
 
     chosen = np.clip(forward()[0].numpy(), -1.0, 1.0)
-    env.step(np.asarray(chosen, dtype=actions.dtype))
-    times = measure(
-        {
-            "physics": kernel_alone(env.walkers),
-            "env": lambda: env.step(chosen),
-            "policy": forward,
-        },
-        effort,
-        "parts of a rollout",
-    )
-    return {name: times.median(name) for name in ("physics", "env", "policy")}
+    env.step(chosen)
+    cases = {
+        "physics": kernel_alone(env.walkers), "env": lambda: env.step(chosen), "policy": forward,
+    }  # fmt: skip
+    times = measure(cases, effort, "parts of a rollout")
+    return {name: times.median(name) for name in cases}
 
 
 def run(smallest: bool) -> list[Measurement]:

@@ -24,7 +24,12 @@ from lean_yaw_env.parameters import (
     WalkerParameters,
 )
 from lean_yaw_env.threads import MOST_THREADS, share_out
-from lean_yaw_env.validation import require_count, require_one_or_each, require_shape
+from lean_yaw_env.validation import (
+    require_count,
+    require_instance,
+    require_one_or_each,
+    require_shape,
+)
 from lean_yaw_env.walker import failure_of
 
 _REPEATS = 64  # of a row's ranges: the compiled check goes through so many rows at a time
@@ -103,11 +108,16 @@ def bodies_of(parameters: WalkerParameters | Sequence[WalkerParameters] | Vector
     if isinstance(parameters, WalkerParameters):
         return np.array([parameters.body()])
     if not isinstance(parameters, np.ndarray):
-        walkers = list(parameters) if isinstance(parameters, Sequence) else [parameters]
-        for i, walker in enumerate(walkers):
-            if not isinstance(walker, WalkerParameters):
-                raise ValueError(f"parameters[{i}] must be WalkerParameters, got {walker!r}")
-        return np.array([walker.body() for walker in walkers])
+        is_many = isinstance(parameters, Sequence) and not isinstance(parameters, str)
+        if not (is_many and parameters):
+            raise ValueError(
+                f"parameters must be WalkerParameters, or n of them, got {parameters!r}"
+            )
+        each = [
+            require_instance(f"parameters[{i}]", walker, WalkerParameters)
+            for i, walker in enumerate(parameters)
+        ]
+        return np.array([walker.body() for walker in each])
     rows = require_shape("parameters", parameters, (None, len(Body._fields)))
     _BODY_LIMITS.check(rows, "parameters[{row}]: {column}")
     return rows

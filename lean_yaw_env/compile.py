@@ -22,6 +22,7 @@ from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.passive import PassiveWalker
 from lean_yaw_env.registration import TASK_VERSIONS
+from lean_yaw_env.reporting import keep, reporting
 from lean_yaw_env.validation import require_choice
 from lean_yaw_env.walker import Walker
 
@@ -86,10 +87,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m lean_yaw_env.compile", description=__doc__)
     parser.add_argument("tasks", nargs="*", metavar="TASK", help="tasks' names; all by default")
     given = parser.parse_args(arguments)
-    try:
+    with reporting("compile"):
+        keep("what is compiled is kept; run the same command again to compile the rest")
         compile_all(given.tasks or tuple(TASK_VERSIONS), lambda line: print(line, flush=True))
-    except ValueError as error:
-        parser.error(str(error))
 
 
 if __name__ == "__main__":

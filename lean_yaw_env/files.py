@@ -30,9 +30,16 @@ _MOST_JSON = 2**26  # bytes
 _INFINITIES = {"inf": math.inf, "-inf": -math.inf}
 
 
+def require_path(path: Any, name: str = "path") -> Path:
+    """Return the path of a file or folder, which need not exist, or raise ``ValueError``."""
+    if not isinstance(path, (str, os.PathLike)) or not os.fspath(path):
+        raise ValueError(f"{name} must be the path of a file or folder, got {path!r}")
+    return Path(path)
+
+
 def require_ending(path: str | os.PathLike[str], endings: tuple[str, ...]) -> Path:
     """Return ``path`` if it ends as asked and its folder exists, or raise ``ValueError``."""
-    place = Path(path)
+    place = require_path(path)
     if place.suffix.lower() not in endings:
         raise ValueError(f"path must end with one of {', '.join(endings)}, got {str(place)!r}")
     if not place.parent.is_dir():

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from gymnasium.envs.registration import register, registry
+from gymnasium.envs.registration import parse_env_id, register, registry
+from gymnasium.error import Error
+
+from lean_yaw_env.validation import require_finite
 
 NAMESPACE = "LeanYaw"
 
@@ -49,7 +52,19 @@ def name_of_task(task: str) -> str:
 
 
 def register_id(env_id: str, task: str, *, reward_threshold: float | None = None) -> None:
-    """Register an id for a task, unless it is registered already."""
+    """Register an id for a task, unless it is registered already.
+
+    Raises
+    ------
+    ValueError
+        If ``env_id`` is not of the form "Namespace/Name-v0", or the threshold is not a number.
+    """
+    try:
+        parse_env_id(env_id)
+    except (TypeError, Error) as error:
+        raise ValueError(f"env_id must be like 'Mine/Zigzag-v0', got {env_id!r}") from error
+    if reward_threshold is not None:
+        require_finite("reward_threshold", reward_threshold)
     TASK_IDS[env_id] = task
     if env_id not in registry:
         register(

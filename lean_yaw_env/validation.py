@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 Choice = TypeVar("Choice", bound=str)
 Instance = TypeVar("Instance")
 
+_LARGEST_SEED = 2**128 - 1
 _NUMBERS = (int, float, np.integer, np.floating)
 
 
@@ -56,6 +57,33 @@ def require_instance(name: str, value: Any, kind: type[Instance]) -> Instance:
     if not isinstance(value, kind):
         raise ValueError(f"{name} must be {kind.__name__}, got {value!r}")
     return value
+
+
+def require_mapping(name: str, value: Any) -> Mapping[Any, Any]:
+    """Return a mapping, such as a dictionary."""
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{name} must be a mapping, got {value!r}")
+    return value
+
+
+def require_pair(name: str, value: Any, contents: str) -> tuple[Any, Any]:
+    """Return a pair; ``contents`` says for the message of what."""
+    if not isinstance(value, (tuple, list, np.ndarray)) or len(value) != 2:
+        raise ValueError(f"{name} must be a pair ({contents}), got {value!r}")
+    first, second = value
+    return first, second
+
+
+def require_text(name: str, value: Any) -> str:
+    """Return a text that is not empty."""
+    if not isinstance(value, str) or not value:
+        raise ValueError(f"{name} must be a text, got {value!r}")
+    return value
+
+
+def require_seed(name: str, value: Any) -> int | None:
+    """Return the seed of a random number generator, or None, which stands for a new one."""
+    return None if value is None else require_count(name, value, 0, _LARGEST_SEED)
 
 
 def require_choice(name: str, value: Any, choices: Collection[Choice]) -> Choice:
@@ -106,16 +134,23 @@ def require_shape(
     name: str, value: ArrayLike, shape: tuple[int | None, ...]
 ) -> NDArray[np.float64]:
     """Return real numbers, NaN included, as a float array of ``shape``, the given one where it fits; None there stands for any length."""
-    try:
-        given = np.asarray(value)
-    except ValueError as error:
-        raise ValueError(_must_hold_numbers(name, value, shape)) from error
-    if given.dtype.kind not in "iuf":
-        raise ValueError(_must_hold_numbers(name, value, shape))
+    kind = f"hold numbers in shape {_written(shape)}" if shape else "be a number"
+    given = _numeric(name, value, kind)
     fits = (wanted in (None, length) for wanted, length in zip(shape, given.shape, strict=False))
     if len(shape) != given.ndim or not all(fits):
-        raise ValueError(f"{name} must have shape {_written(shape)}, got {given.shape}")
+        found = given.shape or repr(value)
+        raise ValueError(f"{name} must have shape {_written(shape)}, got {found}")
     return np.asarray(given, dtype=np.float64, order="C")
+
+
+def require_numbers(name: str, value: ArrayLike, last: int | None = None) -> NDArray[np.float64]:
+    """Return finite numbers, one or more, in the shape that they have as a float array; ``last`` is the length of the last axis."""
+    kind = "hold finite numbers" if last is None else f"hold finite numbers in shape (..., {last})"
+    given = _numeric(name, value, kind)
+    fits = given.size and (last is None or given.shape[-1:] == (last,))
+    if not fits or not np.isfinite(given).all():
+        raise ValueError(f"{name} must {kind}, got {value!r}")
+    return given.astype(np.float64, copy=False)
 
 
 def require_one_or_each(name: str, value: ArrayLike, n: int) -> NDArray[np.float64]:
@@ -128,9 +163,15 @@ def require_one_or_each(name: str, value: ArrayLike, n: int) -> NDArray[np.float
     return given
 
 
-def _must_hold_numbers(name: str, value: Any, shape: tuple[int | None, ...]) -> str:
-    kind = f"hold numbers in shape {_written(shape)}" if shape else "be a number"
-    return f"{name} must {kind}, got {value!r}"
+def _numeric(name: str, value: ArrayLike, kind: str) -> NDArray[Any]:
+    """A value as an array of integers or floats; ``kind`` says for the message what it must do."""
+    try:
+        given = np.asarray(value)
+    except ValueError:  # lists of different lengths
+        given = np.empty((), dtype=object)
+    if given.dtype.kind not in "iuf":
+        raise ValueError(f"{name} must {kind}, got {value!r}")
+    return given
 
 
 def _written(shape: tuple[int | None, ...]) -> str:

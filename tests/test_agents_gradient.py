@@ -235,7 +235,7 @@ def test_jacobians_of_steps_agree_with_differences_of_steps(task):
         return np.column_stack([linearised.values(), seen, rewards, durations])
 
     stepped()
-    jacobians, walks = linearised.jacobians(), ~simulation.ends[0]
+    jacobians, walks = linearised.jacobians(), ~simulation.terminated
     assert walks.mean() > 0.8
     h = 1e-5
     exact = [k for k, name in enumerate(linearised.outputs) if k < len(linearised.followed)]
@@ -245,7 +245,7 @@ def test_jacobians_of_steps_agree_with_differences_of_steps(task):
         if name == "mass_offset":
             continue  # the command moves with it, within the largest change
         difference = (stepped(name, h) - stepped(name, -h)) / (2.0 * h)
-        error = np.abs(difference - jacobians[:, :, column])[walks & ~simulation.ends[0]]
+        error = np.abs(difference - jacobians[:, :, column])[walks & ~simulation.terminated]
         # the integrator's tolerance of 1e-10 over 2 h, and h^2 times third derivatives of order 1e4
         assert error[:, exact].max() < 1e-4, name
         # observations are float32: up to 10, rounded to 5e-7, over h

@@ -59,9 +59,9 @@ def test_a_push_is_drawn_on_its_dial_only_and_no_push_leaves_the_frame_alone():
     drawn = draw_push(frame, (-2.0, 0.0))
     changed = np.argwhere((drawn != frame).any(axis=-1))
     assert len(changed) > 100 and (frame == 200).all()
-    assert np.abs(changed[:, 1] - 240).max() <= DIAL_RADIUS + 1 and changed[:, 0].max() < 70
+    assert np.abs(changed[:, 1] - 450).max() <= DIAL_RADIUS + 1 and changed[:, 0].max() < 70
     # forward is up: the arrow fills more of the dial's upper half
-    inked = (np.abs(drawn.astype(int) - drawn[28, 240].astype(int)).sum(axis=-1) < 30)[:52, 200:280]
+    inked = (np.abs(drawn.astype(int) - drawn[28, 450].astype(int)).sum(axis=-1) < 30)[:52, 410:480]
     assert inked[:27].sum() > 2 * inked[30:].sum()
 
 

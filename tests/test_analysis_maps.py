@@ -261,3 +261,24 @@ def test_bad_disturbances_are_refused() -> None:
         basin(TABLE_1, ("heading", [0.0, 0.0]), ("ankle_angle", [0.0]))
     with pytest.raises(NoGaitError):
         basin(Walker(WalkerParameters(slope=0.0)), ("heading", [0.0]), ("ankle_angle", [0.0]))
+
+
+def test_no_point_without_a_gait_has_a_neighbour_whose_gait_leads_to_one() -> None:
+    axes = {
+        "inter_leg_angle": np.array([0.25, 0.3]),
+        "slope": np.linspace(-0.03, 0.01, 41),
+        "alternating_offset": np.linspace(0.002, 0.06, 30),
+    }
+    section_map = section_map_of(Walker(WalkerParameters(slope_turns=True)))
+    data = stability_map(section_map, axes)
+    has_gait, states = data.status.to_numpy() == gait_map.FOUND, data.state.to_numpy()
+    for axis in range(3):
+        for step in (-1, 1):
+            there = np.argwhere(has_gait)
+            there[:, axis] += step
+            inside = (there[:, axis] >= 0) & (there[:, axis] < has_gait.shape[axis])
+            points, guesses = there[inside], states[has_gait][inside]
+            lacks = ~has_gait[tuple(points.T)]
+            points = {name: values[k] for (name, values), k in zip(axes.items(), points[lacks].T, strict=True)}  # fmt: skip
+            rows = gait_map.gaits_at(section_map, points, guesses[lacks], 1)
+            assert not (rows["status"] == gait_map.FOUND).any()

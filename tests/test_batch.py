@@ -167,7 +167,7 @@ ZERO_TILT = np.where(np.arange(11) == 2, 0.0, 1.0)
             {"parameters": [WalkerParameters(), None]},
             r"parameters\[1\] must be WalkerParameters, got None",
         ),
-        ({"parameters": None}, r"parameters\[0\] must be WalkerParameters, got None"),
+        ({"parameters": None}, "parameters must be WalkerParameters, or n of them, got None"),
     ],
 )
 def test_bad_input_is_refused_by_name(arguments: dict[str, Any], message: str) -> None:

@@ -696,7 +696,7 @@ def test_a_walker_without_a_gait_makes_no_environment() -> None:
     [
         ([0.0], r"action must have shape \(2,\), got \(1,\)"),
         ([[0.0, 0.0]], r"action must have shape \(2,\), got \(1, 2\)"),
-        (0.0, r"action must have shape \(2,\), got \(\)"),
+        (0.0, r"action must have shape \(2,\), got 0.0"),
         ([math.nan, 0.0], r"action must be numbers in \[-1, 1\], got \[nan, 0.0\]"),
         ([0.0, -math.inf], "action must be numbers"),
     ],

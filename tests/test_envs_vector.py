@@ -366,7 +366,7 @@ def test_a_threaded_batch_works_in_a_forked_child() -> None:
         ({"num_envs": 0}, "num_envs must be from 1 to 10000000, got 0"),
         ({"threads": 0}, "threads must be from 1 to 1024, got 0"),
         ({"render_mode": "human"}, "render_mode must be one of rgb_array, got 'human'"),
-        ({"autoreset_mode": "never"}, "'never' is not a valid AutoresetMode"),
+        ({"autoreset_mode": "never"}, "autoreset_mode must be one of .*, got 'never'"),
         ({"task": "Swim"}, "task must be one of"),
         ({"mirror": 1}, "mirror must be True or False, got 1"),
     ],

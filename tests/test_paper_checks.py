@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from lean_yaw_env.paper import report
 from lean_yaw_env.paper.checks import Check, Printed, Result, Section, assess, compare
 from lean_yaw_env.paper.registry import CLASSICS, NAMES, PAPER, PIECES, Piece, pieces_named
 from lean_yaw_env.paper.report import (
@@ -192,7 +193,38 @@ def test_a_reproduction_leaves_report_pictures_and_numbers_and_no_scraps(tmp_pat
         "checks.csv",
         "report.md",
         "report.html",
+        ".finished",
     }
     with (tmp_path / "checks.csv").open(encoding="utf-8") as file:
         assert len(list(csv.DictReader(file))) == len(done.checks)
     assert sum(done.counts().values()) == len(done.checks)
+
+
+def test_a_reproduction_goes_on_where_it_was_and_gives_the_same_report(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+
+    def piece(name: str) -> Piece:
+        def make() -> Result:
+            if made == ["first"] and name == "second":
+                made.append("interruption")
+                raise KeyboardInterrupt
+            made.append(name)
+            return Result((assess(_STATEMENT, True, "large"),), {name: {"a": [1]}})
+
+        return Piece(name, name, make)
+
+    monkeypatch.setattr(report, "pieces_named", lambda names: (piece("first"), piece("second")))
+    with pytest.raises(KeyboardInterrupt):
+        reproduce([], tmp_path)
+    texts = [as_markdown(reproduce([], tmp_path)) for _ in range(2)]
+    assert made == ["first", "interruption", "second"]
+    assert texts[0] == texts[1]
+    (tmp_path / "first.csv").unlink()
+    (tmp_path / ".finished" / "second.json").write_text("{")
+    assert as_markdown(reproduce([], tmp_path)) == texts[0]
+    assert made[3:] == ["first", "second"]  # what is missing or damaged is computed again
+    monkeypatch.setattr(report, "_code_digest", lambda: "another")
+    reproduce([], tmp_path)
+    assert made[5:] == ["first", "second"]

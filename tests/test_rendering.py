@@ -745,7 +745,7 @@ def test_a_pose_names_what_is_wrong_with_it(change, message):
     ("change", "message"),
     [
         ({"parameters": None}, "parameters must be WalkerParameters"),
-        ({"pose": GAIT}, "pose must be a Pose"),
+        ({"pose": GAIT}, "pose must be Pose"),
         ({"footprints": np.zeros((2, 3))}, r"footprints must have shape \(n, 2\), got \(2, 3\)"),
         ({"footprints": np.zeros((2, 2))}, r"headings must have shape \(2,\), got \(0,\)"),
         ({"feet": ["left"]}, "feet must hold 0, one per footprint, got 1"),

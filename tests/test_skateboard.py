@@ -182,7 +182,7 @@ def test_bad_arguments_are_refused_by_name():
         board.eigenvalues([])
     with pytest.raises(ValueError, match="speed must be a finite number"):
         board.equation_of_motion(math.inf)
-    with pytest.raises(ValueError, match="lean must be finite"):
+    with pytest.raises(ValueError, match="lean must hold finite numbers"):
         board.lateral_acceleration(math.nan, 1.0)
     with pytest.raises(ValueError, match="lean_rate must be a finite number"):
         board.motion(1.0, [0.0], lean_rate=math.nan)
@@ -196,5 +196,7 @@ def test_motion_beyond_floating_point_is_refused():
 
 
 def test_unknown_vehicle_has_no_critical_speed():
-    with pytest.raises(TypeError, match="no stable speed range is known for str"):
+    with pytest.raises(
+        TypeError, match="vehicle must be of a class with a known stable speed range"
+    ):
         critical_speed("tricycle")

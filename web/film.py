@@ -42,8 +42,8 @@ SIZE = (800, 450)
 FPS = 16
 SPEED = 0.75
 """Times real time for legs of a metre on earth."""
-DISTANCE, AWAY, HEIGHT = 1.9, 0.5, 0.45
-"""Of the camera from what it looks at, leg lengths: the least, what it is more at the start and end, and up."""
+DISTANCE, HEIGHT = (1.9, 2.6), (0.42, 1.15)
+"""Of the camera from what it looks at, leg lengths: along the floor and up, in the middle of the film and at its ends."""
 START_ANGLE, TURN = 2.5, 1.75
 """Of the camera from downhill, to the right, rad: at the start and end, and how far it goes forward between."""
 _BROWSER = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]  # fmt: skip
@@ -121,8 +121,11 @@ def frames(walk: Walk) -> Iterator[Image.Image]:
             page.evaluate("leanYaw.active().start()")
             for k in tqdm(range(count), unit="frame"):
                 share = math.sin(math.pi * k / count) ** 2
-                angle, distance = START_ANGLE - TURN * share, DISTANCE + AWAY * (1.0 - share)
-                place = [distance * math.cos(angle), HEIGHT, distance * math.sin(angle)]
+                angle = START_ANGLE - TURN * share
+                distance, up = (
+                    near * share + far * (1.0 - share) for near, far in (DISTANCE, HEIGHT)
+                )
+                place = [distance * math.cos(angle), up, distance * math.sin(angle)]
                 duration = SPEED / FPS / SECONDS_PER_TIME_UNIT
                 step, picture = page.evaluate(_FRAME, [duration, 1.0 / FPS, place, pushes])
                 drawn = Image.open(io.BytesIO(base64.b64decode(picture))).convert("RGB")

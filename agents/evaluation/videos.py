@@ -27,7 +27,10 @@ STAND_INS = ("lqr", "feedback", "fixed")
 DIAL_RADIUS = 22.0
 """Of the dial that shows pushes, pixels: a push of ``_DIAL_REACH`` standard deviations."""
 _DIAL_REACH = 2.0
-_DIAL_PLACE = (0.5, 28.0)  # share of the width, pixels from the top
+_DIAL_PLACE = (
+    30.0,
+    28.0,
+)  # pixels from the right and from the top: beside the walker in perspective
 
 
 def film_agent(
@@ -131,7 +134,7 @@ def draw_push(frame: Frame, push: tuple[float, float] | None) -> Frame:
 
     picture = Image.fromarray(frame)
     draw = ImageDraw.Draw(picture)
-    x, y = _DIAL_PLACE[0] * frame.shape[1], _DIAL_PLACE[1]
+    x, y = frame.shape[1] - _DIAL_PLACE[0], _DIAL_PLACE[1]
     r = DIAL_RADIUS
     draw.ellipse((x - r, y - r, x + r, y + r), fill=FLOOR, outline=FAINT_INK)
     draw.text((x, y + r + 2.0), "push", fill=INK, anchor="mt")

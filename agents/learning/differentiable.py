@@ -138,7 +138,7 @@ class DifferentiableWalkers:
     def _outputs(self) -> NDArray[np.float64]:
         """The numbers of the step just made, as the Jacobians' rows name them; a fall takes no time here."""
         simulation = self._simulation
-        durations = np.where(simulation.ends[0], 0.0, simulation.walkers["duration"])
+        durations = np.where(simulation.terminated, 0.0, simulation.walkers["duration"])
         observations = simulation.observations.astype(np.float64)
         return np.column_stack(
             [self._linearised.values(), observations, simulation.rewards, durations]

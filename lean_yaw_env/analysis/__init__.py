@@ -20,7 +20,7 @@ from lean_yaw_env.analysis.contact import FloorDemand, StepDemand, floor_demand
 from lean_yaw_env.analysis.continuation import Branch, Event, continue_gait
 from lean_yaw_env.analysis.critical_speed import stable_speeds
 from lean_yaw_env.analysis.eigenmodes import Mode, modes
-from lean_yaw_env.analysis.gait_map import stability_map
+from lean_yaw_env.analysis.gait_map import map_cost, stability_map
 from lean_yaw_env.analysis.limit_cycle import (
     LimitCycle,
     find_gait,
@@ -62,6 +62,7 @@ __all__ = [
     "largest_disturbance",
     "largest_pushes",
     "load_dataset",
+    "map_cost",
     "modes",
     "planar_gait_rate",
     "refine_capture",

@@ -39,7 +39,7 @@ from lean_yaw_env.parameters import (
     require_inter_leg_angle,
     require_state,
 )
-from lean_yaw_env.validation import require_choice, require_count
+from lean_yaw_env.validation import require_choice, require_count, require_finite, require_instance
 from lean_yaw_env.walker import Fall, StepResult, Walker, require_completed
 
 if TYPE_CHECKING:
@@ -88,6 +88,7 @@ class ActiveMap(SectionMap):
     )
 
     def __post_init__(self) -> None:
+        require_instance("walker", self.walker, Walker)
         require_inter_leg_angle(self.inter_leg_angle)
         require_offsets(self.mass_offset)
         require_count("n_steps", self.n_steps)
@@ -156,6 +157,7 @@ class ActiveMap(SectionMap):
         yield search_active(self, exact=True)
 
     def value(self, parameter: str) -> float:
+        require_choice("parameter", parameter, self.parameters)
         left, right = self.mass_offset
         commands = {
             "inter_leg_angle": self.inter_leg_angle,
@@ -165,13 +167,14 @@ class ActiveMap(SectionMap):
         return commands[parameter] if parameter in commands else super().value(parameter)
 
     def moved(self, parameter: str, value: float) -> Self:
-        if parameter not in COMMAND_PARAMETERS:
+        if not isinstance(parameter, str) or parameter not in COMMAND_PARAMETERS:
             return super().moved(parameter, value)
         commands = {name: self.value(name) for name in COMMAND_PARAMETERS}
         angle, mean, apart = {**commands, parameter: value}.values()
         return replace(self, inter_leg_angle=angle, mass_offset=(mean + apart, mean - apart))
 
     def along(self, parameter: str) -> Self:
+        require_choice("parameter", parameter, self.parameters)
         # the same offset for both feet, but for none, is no mirror image of itself
         return self.over(2) if parameter == "mass_offset" and self.n_steps == 1 else self
 
@@ -240,7 +243,9 @@ def planar_gait_rate(walker: Walker, inter_leg_angle: float, heading: float = 0.
     Without hip width, one step multiplies the squared rate by k^2, k the planar impact's ratio, after gravity has added the slope's work.
     Returns nan where the slope gives no energy, or no impact takes any.
     """
-    parameters = walker.parameters
+    require_finite("heading", heading)
+    require_inter_leg_angle(inter_leg_angle)
+    parameters = require_instance("walker", walker, Walker).parameters
     return planar_rate(parameters.foot_radius, parameters.slope, inter_leg_angle, heading)
 
 
@@ -318,7 +323,9 @@ def _planar_guess(section_map: ActiveMap) -> Vector:
     if offset != 0.0 and not parameters.slope_turns:
         sine = -offset / math.tan(parameters.slope or math.inf)
         heading = math.asin(sine) if abs(sine) < 1.0 else math.nan
-    rate = planar_gait_rate(section_map.walker, section_map.inter_leg_angle, heading)
+    rate = planar_rate(
+        parameters.foot_radius, parameters.slope, section_map.inter_leg_angle, heading
+    )
     if math.isnan(rate):
         raise NoGaitError(
             "the planar gait has no closed form here: the slope gives no energy along any heading "

@@ -21,7 +21,15 @@ from lean_yaw_env.analysis.section_map import (
 )
 from lean_yaw_env.analysis.storage import Growing, require_axis
 from lean_yaw_env.parameters import QUARTER_TURN, Vector
-from lean_yaw_env.validation import require_choice, require_count, require_number
+from lean_yaw_env.validation import (
+    require_array,
+    require_choice,
+    require_count,
+    require_flag,
+    require_instance,
+    require_number,
+    require_pair,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -79,9 +87,13 @@ def basin(
         If there is no gait.
     """
     require_count("n_steps", n_steps, 1, 1_000_000)
+    require_flag("progress", progress)
     section_map = section_map_of(walker, **command)
+    if centre is not None:
+        section_map.require_state(require_array("centre", centre, (len(section_map.names),)))
     cycle = find_limit_cycle(section_map) if centre is None else None
     middle = cycle.state if cycle is not None else section_map.require_state(np.asarray(centre))
+    x, y = (require_pair(*axis, "coordinate, values") for axis in (("x", x), ("y", y)))
     if x[0] == y[0]:
         raise ValueError(f"x and y must be different coordinates, got {x[0]!r} twice")
     axes, states = section_grid(section_map, dict((x, y)), middle)
@@ -195,6 +207,8 @@ def largest_disturbance(
     SolverError
         If the integrator fails.
     """
+    require_flag("upward", upward)
+    require_flag("relative", relative)
     require_number("most", most, 0.0, 1e6, "(]")
     require_number("tolerance", tolerance, 0.0, most, "(]")
     section_map = section_map_of(walker, **command)
@@ -265,6 +279,7 @@ def largest_pushes(
     SolverError
         If the integrator fails.
     """
+    require_instance("cycle", cycle, LimitCycle)
     require_count("directions", directions, 1, 3600)
     require_number("most", most, 0.0, 100.0, "(]")
     angles = 2.0 * np.pi * np.arange(directions) / directions

@@ -36,7 +36,13 @@ from lean_yaw_env.analysis.section_map import (
 from lean_yaw_env.analysis.storage import progress_bar
 from lean_yaw_env.errors import LeanYawError, NoGaitError
 from lean_yaw_env.parameters import Vector
-from lean_yaw_env.validation import require_count, require_number
+from lean_yaw_env.validation import (
+    require_count,
+    require_finite,
+    require_flag,
+    require_number,
+    require_pair,
+)
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -115,6 +121,7 @@ class Branch:
 
     def cycle(self, index: int) -> LimitCycle:
         """The gait at a point of the branch."""
+        require_count("index", index, -len(self.values), len(self.values) - 1)
         moved = self.section_map.moved(self.parameter, float(self.values[index]))
         return cycle_at(moved, self.states[index])
 
@@ -165,11 +172,15 @@ def continue_gait(
     simple = section_map_of(walker, **command)
     section_map = simple.along(parameter) if n_steps is None else simple.over(n_steps)
     value = section_map.value(parameter)
-    low, high = (float(limit) for limit in limits)
+    low, high = (
+        require_finite("limits", limit) for limit in require_pair("limits", limits, "low, high")
+    )
     if not low < high:
         raise ValueError(f"limits must be (low, high) with low < high, got {limits!r}")
     if not low <= value <= high:
         raise ValueError(f"limits must hold the start's {parameter}, {value:g}, got {limits!r}")
+    require_flag("upward", upward)
+    require_flag("progress", progress)
     require_number("longest_step", longest_step, 0.0, 1.0, "(]")
     require_count("most_points", most_points, 2, 1_000_000)
     start = find_limit_cycle(simple).state if state is None else section_map.require_state(state)

@@ -14,6 +14,7 @@ from lean_yaw_env.analysis.continuation import continue_gait
 from lean_yaw_env.analysis.limit_cycle import LimitCycle, cycle_at, find_limit_cycle
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.parameters import INTER_LEG_ANGLE
+from lean_yaw_env.validation import require_instance
 from lean_yaw_env.vehicles.stability import SpeedRange, stable_speed_range
 from lean_yaw_env.walker import Walker
 
@@ -34,6 +35,7 @@ def stable_speeds(walker: Walker, *, inter_leg_angle: float = INTER_LEG_ANGLE) -
         stability or ceases (it lifts off); ``inf`` if neither happens up to a slope of 0.3. None
         if no gait on the slopes tried is stable.
     """
+    require_instance("walker", walker, Walker)
     for slope in _TRIED:
         here = Walker(replace(walker.parameters, slope=slope))
         try:

@@ -19,6 +19,7 @@ from scipy import linalg
 
 from lean_yaw_env.analysis.limit_cycle import LimitCycle
 from lean_yaw_env.analysis.section_map import Motion
+from lean_yaw_env.validation import require_instance
 
 ZERO = 1e-6
 """A multiplier below this is zero but for round-off: its disturbance is gone within a cycle."""
@@ -68,6 +69,7 @@ class Mode:
 
 def modes(cycle: LimitCycle) -> tuple[Mode, ...]:
     """Take a gait's Jacobian apart: as many modes as ``cycle.eigenvalues``, by falling magnitude."""
+    require_instance("cycle", cycle, LimitCycle)
     values, left, right = linalg.eig(cycle.jacobian, left=True, right=True)  # pyright: ignore[reportAssignmentType]
     found = [
         _mode(cycle, complex(value), np.conj(backward), forward)

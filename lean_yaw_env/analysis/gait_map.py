@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,11 +26,11 @@ from lean_yaw_env.analysis.section_map import (
     WalkerOrMap,
     section_map_of,
 )
-from lean_yaw_env.analysis.storage import Growing, require_axis
+from lean_yaw_env.analysis.storage import Growing, require_axis, require_memory
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.records import Body, Outcome
 from lean_yaw_env.parameters import STATE_SIZE, Vector
-from lean_yaw_env.validation import require_count
+from lean_yaw_env.validation import require_count, require_flag, require_mapping
 
 if TYPE_CHECKING:
     import xarray
@@ -91,7 +92,9 @@ def stability_map(
         If an argument is outside its range, or the file holds another map.
     """
     require_count("threads", threads, 1, 1024)
+    require_flag("progress", progress)
     grid = _Grid(section_map_of(walker, **command), axes)
+    require_memory("axes", grid.n, _bytes(grid))
     values = _empty(grid.section_map, grid.n)
     values["status"][:] = NOT_YET
     question = grid.section_map.question()
@@ -112,13 +115,33 @@ def stability_map(
     return growing.dataset()
 
 
+def map_cost(
+    walker: WalkerOrMap,
+    axes: Mapping[str, Sequence[float] | Vector],
+    **command: Unpack[CommandArguments],
+) -> tuple[float, float]:
+    """Estimate what a ``stability_map`` costs with one thread: bytes of memory, and seconds from some of its points on this machine."""
+    grid = _Grid(section_map_of(walker, **command), axes)
+    sample = np.linspace(0, grid.n - 1, min(grid.n, 16)).astype(np.intp)
+    gaits_at(grid.section_map, grid.points(sample[:1]), None, 1)  # compiles
+    began = time.process_time()
+    gaits_at(grid.section_map, grid.points(sample), None, 1)
+    each = (time.process_time() - began) / len(sample)
+    return grid.n * _bytes(grid), grid.n * each
+
+
+def _bytes(grid: _Grid) -> float:
+    """Memory of a point: its numbers, and copies of them while they are written."""
+    return 3.0 * sum(column.nbytes for column in _empty(grid.section_map, 1).values())
+
+
 class _Grid:
     """The points of a map, in row-major order; checks every value of the axes."""
 
     def __init__(
         self, section_map: SectionMap, axes: Mapping[str, Sequence[float] | Vector]
     ) -> None:
-        if not 1 <= len(axes) <= 3:
+        if not 1 <= len(require_mapping("axes", axes)) <= 3:
             raise ValueError(f"axes must name one to three parameters, got {list(axes)}")
         for name in axes:
             section_map = section_map.along(name)
@@ -256,26 +279,25 @@ def _walker_grid(section_map: ActiveMap, points: Mapping[str, Vector], threads: 
 def _spread(
     grid: _Grid, values: Columns, fresh: NDArray[np.intp], threads: int
 ) -> NDArray[np.intp]:
-    """Try the neighbours, where none was found, of points that have just got a gait; those found."""
+    """Try the neighbours, where none was found, of points that have just got a gait, direction by direction; those found."""
     places = np.array(np.unravel_index(fresh, grid.shape))
-    tried, guess_from = [], []
+    found: list[NDArray[np.intp]] = []
     for axis, size in enumerate(grid.shape):
         for step in (-1, 1):
             there = places.copy()
             there[axis] += step
             inside = (there[axis] >= 0) & (there[axis] < size)
-            tried.append(np.ravel_multi_index(tuple(there[:, inside]), grid.shape))
-            guess_from.append(fresh[inside])
-    points, first = np.unique(np.concatenate(tried), return_index=True)
-    sources = np.concatenate(guess_from)[first]
-    waits = values["status"][points] == NONE_FOUND
-    points, sources = points[waits], sources[waits]
-    found = np.zeros(points.size, dtype=bool)
-    for start in range(0, points.size, _CHUNK):
-        part = slice(start, start + _CHUNK)
-        here, guesses = points[part], values["state"][sources[part]]
-        rows = gaits_at(grid.section_map, grid.points(here), guesses, threads)
-        found[part] = good = rows["status"] == FOUND
-        for name, column in rows.items():
-            values[name][here[good]] = column[good]
-    return points[found]
+            points = np.ravel_multi_index(tuple(there[:, inside]), grid.shape)
+            waits = values["status"][points] == NONE_FOUND
+            points, sources = points[waits], fresh[inside][waits]
+            for start in range(0, points.size, _CHUNK):
+                here, guesses = (
+                    points[start : start + _CHUNK],
+                    values["state"][sources[start : start + _CHUNK]],
+                )
+                rows = gaits_at(grid.section_map, grid.points(here), guesses, threads)
+                good = rows["status"] == FOUND
+                for name, column in rows.items():
+                    values[name][here[good]] = column[good]
+                found.append(here[good])
+    return np.concatenate(found) if found else fresh[:0]

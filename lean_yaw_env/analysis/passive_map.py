@@ -35,7 +35,7 @@ from lean_yaw_env.passive import (
     require_passive_state,
     step_passive_rows,
 )
-from lean_yaw_env.validation import require_choice, require_count
+from lean_yaw_env.validation import require_choice, require_count, require_instance
 from lean_yaw_env.walker import SIDE, Walker, raise_for_failure
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ class PassiveMap(SectionMap):
     )
 
     def __post_init__(self) -> None:
+        require_instance("walker", self.walker, PassiveWalker)
         require_count("n_steps", self.n_steps)
 
     @property

@@ -207,6 +207,7 @@ class SectionMap(ABC):
 
     def along(self, parameter: str) -> Self:
         """The map over as many steps as its gaits repeat in at every value of a parameter."""
+        require_choice("parameter", parameter, self.parameters)
         return self
 
     def question(self) -> dict[str, Any]:

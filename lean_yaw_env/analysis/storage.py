@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lean_yaw_env.files import written_whole
+from lean_yaw_env.files import require_path, written_whole
 from lean_yaw_env.parameters import Vector
-from lean_yaw_env.validation import require_array
+from lean_yaw_env.validation import require_array, require_flag, require_instance
 
 if TYPE_CHECKING:
     import xarray
@@ -38,7 +38,8 @@ def labelled() -> Any:
 
 def save_dataset(dataset: xarray.Dataset, path: str | Path) -> Path:
     """Write a dataset to a netCDF file, replacing what was there only once it is complete."""
-    target = Path(path)
+    target = require_path(path)
+    require_instance("dataset", dataset, labelled().Dataset)
     target.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(target) as temporary:
         dataset.to_netcdf(temporary, engine=_ENGINE)
@@ -53,7 +54,7 @@ def load_dataset(path: str | Path) -> xarray.Dataset:
     ValueError
         If there is no such file, or it is not one of these.
     """
-    source = Path(path)
+    source = require_path(path)
     if not source.is_file():
         raise ValueError(f"path must be a file, got {str(source)!r}, which is none")
     try:
@@ -68,10 +69,29 @@ def require_axis(
     name: str, values: Sequence[float] | Vector, low: float = -math.inf, high: float = math.inf
 ) -> Vector:
     """One or more growing numbers, each between ``low`` and ``high`` (both excluded), or ``ValueError``."""
-    array = require_array(name, np.asarray(values), (None,), low, high)
+    array = require_array(name, values, (None,), low, high)
     if not array.size or np.any(np.diff(array) <= 0.0):
         raise ValueError(f"{name} must be growing numbers, got {values!r}")
     return array
+
+
+def free_memory() -> float:
+    """Bytes of memory that are free; infinity where the system does not say."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            return 1024.0 * next(int(line.split()[1]) for line in file if "MemAvailable" in line)
+    except (OSError, StopIteration, ValueError):
+        return math.inf
+
+
+def require_memory(name: str, points: int, each: float) -> None:
+    """``ValueError`` unless there is memory for so many points of ``each`` bytes."""
+    wanted, free = points * each, free_memory()
+    if wanted > free:
+        raise ValueError(
+            f"{name} must have points that fit into memory, got {points:,}, which take about {wanted / 1e9:,.1f} GB of the {free / 1e9:,.1f} GB "
+            "that are free; compute parts of the grid, each with a file of its own"
+        )
 
 
 def progress_bar(name: str, shown: bool, total: int | None = None) -> Any:
@@ -123,7 +143,9 @@ class Growing:
         attrs: Mapping[str, str] | None = None,
         notes: Mapping[str, Mapping[str, str]] | None = None,
     ) -> None:
-        self._axes, self._columns, self._path = dict(axes), columns, Path(path) if path else None
+        self._axes, self._columns = dict(axes), columns
+        self._path = None if path is None else require_path(path)
+        require_flag("progress", progress)
         self._dimensions, self._coords, self._notes = dimensions or {}, coords or {}, notes or {}
         self._attrs = {"question": json.dumps(question, sort_keys=True), **(attrs or {})}
         self._saved = time.monotonic()

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import sys
-
-from lean_yaw_env.extras import MissingLibraryError, needs_extra
+from lean_yaw_env.extras import needs_extra
+from lean_yaw_env.reporting import reporting
 
 __all__ = ["main"]
 
 
 def main() -> None:
     """Entry point of ``lean-yaw``; needs the libraries of ``lean-yaw-env[analysis]``."""
-    try:
+    with reporting("lean-yaw"):
         with needs_extra("analysis"):
             from lean_yaw_env.cli.app import app
-    except MissingLibraryError as error:
-        sys.exit(f"lean-yaw: {error}")
-    app()
+        app()

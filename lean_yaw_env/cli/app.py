@@ -38,6 +38,10 @@ MassOffset = Annotated[
 Out = Annotated[
     Path | None, typer.Option(help="Keep the whole result in this netCDF file; resumes from it.")
 ]
+_MANY_POINTS = 10_000
+"""A map of more points says beforehand what it costs."""
+_RECORD = 2_000.0
+"""Bytes of a point among what is printed."""
 Speeds = Annotated[str, typer.Option(help="Speeds in m/s: a number or low:high:count.")]
 
 
@@ -79,11 +83,24 @@ def stability(
     out: Out = None,
 ) -> Output:
     """Find the gait and its stability at every point of a grid of parameters."""
-    from lean_yaw_env.analysis import stability_map
+    from lean_yaw_env.analysis import map_cost, stability_map
+    from lean_yaw_env.analysis.storage import require_memory
 
+    axes = parse_axes(axis)
+    points = math.prod(values.size for values in axes.values())
+    if points > _MANY_POINTS:
+        require_memory("axes", points, _RECORD)
+        size, seconds = map_cost(
+            walker, axes, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset
+        )
+        size += points * _RECORD
+        typer.echo(
+            f"{points:,} points: about {size / 1e9:.2g} GB of memory and {seconds / 60.0 / threads:.2g} minutes",
+            err=True,
+        )
     data = stability_map(
         walker,
-        parse_axes(axis),
+        axes,
         inter_leg_angle=inter_leg_angle,
         mass_offset=mass_offset,
         path=out,
@@ -277,10 +294,21 @@ def view(
         typer.echo(f"the page is at {server.address} until Ctrl-C")
         try:
             server.wait()
-        except KeyboardInterrupt:
+        finally:
             server.close()
 
     return Output({"address": server.address}, serve)
+
+
+@command()
+def findings(
+    out: Annotated[Path, typer.Option(help="Folder for findings.md, findings.csv and images.")],
+) -> Output:
+    """Compute what this software finds beyond the paper: walking on the level, stability over bodies, what chosen steps can save."""
+    from lean_yaw_env.paper.findings import write_findings
+
+    page = write_findings(out, progress=sys.stderr.isatty())
+    return Output({"page": str(page)}, lambda: typer.echo(f"written: {page}"))
 
 
 @command()

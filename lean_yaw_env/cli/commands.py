@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import math
 from collections.abc import Callable, Iterable
 from functools import wraps
 from pathlib import Path
@@ -13,18 +12,16 @@ import numpy as np
 import typer
 
 from lean_yaw_env.cli.records import as_json
-from lean_yaw_env.errors import LeanYawError
 from lean_yaw_env.files import require_ending
 from lean_yaw_env.parameters import Vector, WalkerParameters
 from lean_yaw_env.passive import PassiveWalker
 from lean_yaw_env.rendering.figures import ENDINGS, save_figure
+from lean_yaw_env.reporting import keep, reporting
+from lean_yaw_env.validation import require_count
 from lean_yaw_env.walker import Walker
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-WRONG_INPUT, NO_RESULT = 2, 1
-MOST_POINTS = 100_000
 
 
 class Output(NamedTuple):
@@ -68,7 +65,11 @@ def add_command(
         @wraps(function)
         def command(as_json: bool, plot: Path | None = None, **options: Any) -> None:
             description = {key: options.pop(key) for key in described}
-            try:
+            with reporting("lean-yaw"):
+                if options.get("out") is not None:
+                    keep(
+                        f"what is finished is in {options['out']}; run the same command again to continue"
+                    )
                 if plot is not None:
                     require_ending(plot, ENDINGS)
                 if needs_walker:
@@ -76,11 +77,6 @@ def add_command(
                 output = function(**options)
                 if plot is not None and output.figure is not None:
                     save_figure(output.figure(), plot)
-            except (ValueError, OverflowError, OSError) as error:
-                _give_up(error, WRONG_INPUT)
-            except (LeanYawError, ImportError) as error:
-                _give_up(error, NO_RESULT)
-            else:
                 _print(output, as_json)
 
         options = [*own.values(), *described.values(), *([_PLOT] if draws else []), _AS_JSON]
@@ -94,11 +90,6 @@ def add_command(
 
 def _print(output: Output, json: bool) -> None:
     typer.echo(as_json(output.record)) if json else output.show()
-
-
-def _give_up(error: Exception, code: int) -> None:
-    typer.echo(f"lean-yaw: {error}", err=True)
-    raise typer.Exit(code) from error
 
 
 def walker_of(
@@ -142,21 +133,20 @@ def parse_range(text: str, name: str = "range") -> Vector:
     ValueError
         If it is neither, low is not below high, or the count is not in [2, 100000].
     """
-    fields = text.split(":")
     form = f"{name} must be a number or low:high:count, such as 0.1:0.8:15, got {text!r}"
+    fields = text.split(":")
     try:
-        numbers = [float(field) for field in fields[:2]]
-        count = int(fields[2]) if len(fields) == 3 else 1
+        numbers = np.array(fields[:2], dtype=float)
+        count = int(fields[2]) if len(fields) > 2 else 1
     except ValueError as error:
         raise ValueError(form) from error
-    if len(fields) not in (1, 3) or not all(math.isfinite(number) for number in numbers):
+    if len(fields) not in (1, 3) or not np.isfinite(numbers).all():
         raise ValueError(form)
     if len(fields) == 1:
-        return np.array(numbers)
+        return numbers
     if not numbers[0] < numbers[1]:
         raise ValueError(f"{name} must rise from low to high, got {text!r}")
-    if not 2 <= count <= MOST_POINTS:
-        raise ValueError(f"{name}: the count must be in [2, {MOST_POINTS}], got {count}")
+    require_count(f"{name}: the count", count, 2, 100_000)
     return np.linspace(numbers[0], numbers[1], count)
 
 

@@ -21,6 +21,7 @@ from lean_yaw_env.envs.tasks.waypoints import (
 )
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.envs.walker_env import WalkerEnv
+from lean_yaw_env.validation import require_mapping, require_numbers
 
 GOAL_SCALE = 8.0
 """Leg lengths that a goal's unit stands for; a power of two, so that scaling rounds nothing."""
@@ -141,7 +142,9 @@ class WaypointGoalVectorEnv(GoalRules, WalkerVectorEnv):
 
 def is_reached(achieved_goal: ArrayLike, desired_goal: ArrayLike) -> NDArray[np.bool_]:
     """Whether places (..., 2) are within the goal's radius, shape (...), as the task itself decides it."""
-    apart = np.subtract(achieved_goal, desired_goal, dtype=np.float64)
+    achieved = require_numbers("achieved_goal", achieved_goal, 2)
+    desired = require_numbers("desired_goal", desired_goal, 2)
+    apart = achieved - desired
     square = apart[..., 0] * apart[..., 0] + apart[..., 1] * apart[..., 1]
     return np.asarray(np.sqrt(square) <= RADIUS / GOAL_SCALE)
 
@@ -207,4 +210,6 @@ def _numbers(info: Infos, key: str) -> NDArray[Any]:
     """A number of each info; 0 where there is none."""
     if isinstance(info, Mapping):
         return np.asarray(info.get(key, 0))
-    return np.array([each.get(key, 0) for each in info])
+    if not isinstance(info, (list, tuple, np.ndarray)):
+        raise ValueError(f"info must be a mapping, or a sequence of them, got {info!r}")
+    return np.array([require_mapping("info", each).get(key, 0) for each in info])

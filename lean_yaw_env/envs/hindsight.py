@@ -21,6 +21,7 @@ from stable_baselines3.common.type_aliases import DictReplayBufferSamples
 from stable_baselines3.common.vec_env import VecNormalize
 
 from lean_yaw_env.envs.goal_env import seen_from_walker
+from lean_yaw_env.validation import require_flag, require_instance
 
 
 class HindsightReplay(HerReplayBuffer):
@@ -51,6 +52,8 @@ class GoalFromWalker(BaseFeaturesExtractor):
     """
 
     def __init__(self, observation_space: spaces.Dict, mirror: bool = True) -> None:
+        require_flag("mirror", mirror)
+        require_instance("observation_space", observation_space, spaces.Dict)
         zeros = {key: np.zeros(box.shape or ()) for key, box in observation_space.items()}
         super().__init__(observation_space, len(seen_from_walker(zeros, mirror=mirror)))
         self._mirror = mirror

@@ -18,6 +18,7 @@ from lean_yaw_env.envs.observation import COMMON_NAMES, OBSERVATION_LIMIT, STANC
 from lean_yaw_env.envs.reset import BODY_DEVIATIONS, HELD_OUT_REACH, BodyDraw
 from lean_yaw_env.envs.state import BODY_NAMES, SETTINGS, Records
 from lean_yaw_env.envs.tasks import Task
+from lean_yaw_env.envs.tasks.task import TASK_RANGES
 from lean_yaw_env.parameters import (
     INTER_LEG_ANGLE,
     PARAMETER_NAMES,
@@ -25,7 +26,13 @@ from lean_yaw_env.parameters import (
     Range,
     WalkerParameters,
 )
-from lean_yaw_env.validation import require_choice, require_flag, suggestion
+from lean_yaw_env.validation import (
+    require_choice,
+    require_flag,
+    require_instance,
+    require_mapping,
+    suggestion,
+)
 from lean_yaw_env.walker import Walker
 
 RandomBody = Literal["training", "held-out"]
@@ -41,9 +48,7 @@ _RANGES = (
     Range("sensor_noise", 0.0, 10.0),
 )
 _OPTIONAL_RANGES = (
-    Range("max_offset_change", 0.0, 2.0),
-    Range("horizon", 0.0, math.inf, "(]"),
-    Range("push_level", 0.0, 10.0),
+    *TASK_RANGES,
     *(limits for limits in PARAMETER_RANGES if limits.name in ("slope", "friction_limit")),
 )
 _NO_LIMIT = 2**62  # steps
@@ -125,13 +130,14 @@ class EnvOptions:
     def of(cls, arguments: Mapping[str, Any]) -> EnvOptions:
         """Options from an environment's keyword arguments, or ``TypeError`` naming one that there is not, and the nearest that there is."""
         known = [field.name for field in fields(cls)]
-        for name in arguments:
+        for name in require_mapping("arguments", arguments):
             if name not in known:
                 raise TypeError(f"unexpected keyword argument {name!r}{suggestion(name, known)}")
         return cls(**arguments)
 
     def for_task(self, task: Task) -> TaskOptions:
         """These options with the task's defaults in the place of None, and slope and friction limit among the parameters."""
+        require_instance("task", task, Task)
         parameters = task.parameters if self.parameters is None else self.parameters
         assert isinstance(parameters, WalkerParameters)
         return TaskOptions(
@@ -152,7 +158,8 @@ class EnvOptions:
     def observation_names(self, task: Task) -> tuple[str, ...]:
         """What each number of an observation is."""
         common = COMMON_NAMES[:STANCE_FOOT] if self.mirror else COMMON_NAMES
-        return (*common, *(feature.name for feature in task.observed))
+        own = require_instance("task", task, Task).observed
+        return (*common, *(feature.name for feature in own))
 
     def observation_space(self, task: Task) -> spaces.Space[NDArray[np.float32]]:
         """A box as large as ``observation_names``."""

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from lean_yaw_env.envs.goal_env import WaypointGoalVectorEnv
+from lean_yaw_env.envs.options import ACTION_SIZE
 from lean_yaw_env.envs.snapshots import from_plain, plain
 from lean_yaw_env.envs.tasks import Task
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.registration import GOAL_ENV_ID
+from lean_yaw_env.validation import require_count, require_mapping, require_text
 
 Observations = Any
 """An array (num_envs, features); of goal-conditioned walkers a dictionary of such arrays."""
@@ -97,7 +99,8 @@ class WalkerVecEnv(VecEnv):
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Take the actions (num_envs, 2) that ``step_wait`` will step by."""
-        self._actions = actions
+        shape = (self.num_envs, ACTION_SIZE)
+        self._actions = self.walkers.simulation.require_actions("actions", actions, shape)
 
     def step_wait(
         self,
@@ -121,11 +124,12 @@ class WalkerVecEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """The attribute of the walkers' common environment, once for each index."""
-        value = getattr(self.walkers, attr_name)
+        value = getattr(self.walkers, require_text("attr_name", attr_name))
         return [value for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Set an attribute of the walkers' common environment; ``ValueError`` for some of the walkers only."""
+        require_text("attr_name", attr_name)
         if sorted(self._get_indices(indices)) != list(range(self.num_envs)):
             raise ValueError(
                 f"indices must be all {self.num_envs} walkers, which share {attr_name!r}, got {indices!r}"
@@ -136,8 +140,10 @@ class WalkerVecEnv(VecEnv):
         self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
     ) -> list[Any]:
         """Call a method of the walkers' common environment once; its result, once for each index."""
-        result = getattr(self.walkers, method_name)(*method_args, **method_kwargs)
-        return [result for _ in self._get_indices(indices)]
+        rows = self._get_indices(indices)
+        method = getattr(self.walkers, require_text("method_name", method_name))
+        result = method(*method_args, **method_kwargs)
+        return [result for _ in rows]
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """No walker is wrapped on its own."""
@@ -172,11 +178,20 @@ class WalkerVecEnv(VecEnv):
         """
         sums = {"episode_returns": self.episode_returns, "episode_lengths": self.episode_lengths}
         for name, own in sums.items():
-            if name not in snapshot or snapshot[name].shape != own.shape:
-                raise ValueError(f"snapshot must hold {name!r} in shape {own.shape}")
+            given = require_mapping("snapshot", snapshot).get(name)
+            if not isinstance(given, np.ndarray) or given.shape != own.shape:
+                raise ValueError(f"snapshot must hold {name!r} in shape {own.shape}, got {given!r}")
         self.walkers.set_state(from_plain(self.walkers.simulation, snapshot))
         for name, own in sums.items():
             own[:] = snapshot[name]
+
+    def _get_indices(self, indices: Any) -> list[int]:
+        """The walkers' numbers: of all, of one or of some."""
+        some = range(self.num_envs) if indices is None else indices
+        some = [some] if isinstance(some, (int, np.integer)) else some
+        if not isinstance(some, (range, list, tuple, np.ndarray)):
+            raise ValueError(f"indices must be whole numbers, got {indices!r}")
+        return [require_count("indices", i, 0, self.num_envs - 1) for i in some]
 
     def _reset_each(self, seeds: list[int | None] | None) -> Observations:
         """Reset walkers that have options of their own, one after the other."""

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.envs.dynamics import command_many, walk_many, walk_one
 from lean_yaw_env.envs.info import FallCode, InfoMaker
@@ -26,7 +26,15 @@ from lean_yaw_env.envs.state import (
 from lean_yaw_env.envs.tasks import Task
 from lean_yaw_env.kernel.compilation import for_types_of
 from lean_yaw_env.parameters import Vector, WalkerParameters, require_foot, require_state
-from lean_yaw_env.validation import require_array, require_number, suggestion
+from lean_yaw_env.validation import (
+    require_array,
+    require_count,
+    require_instance,
+    require_mapping,
+    require_number,
+    require_shape,
+    suggestion,
+)
 from lean_yaw_env.walker import SIDE
 
 RESET_OPTIONS = ("state", "stance")
@@ -35,6 +43,7 @@ _KEYS = 2**64
 _SOLVER = int(FallCode.SOLVER)
 _STEP, _RESET, _EDIT, _NONE = (int(event) for event in Event)
 Flags = NDArray[np.bool_]
+_SINGLE = np.dtype(np.float32)
 
 
 class Simulation:
@@ -66,9 +75,11 @@ class Simulation:
     def __init__(
         self, task: Task, options: EnvOptions, n: int, *, max_episode_steps: int | None = None
     ) -> None:
-        self.task = task
-        self.options = options
-        self.n = n
+        self.task = require_instance("task", task, Task)
+        self.options = require_instance("options", options, EnvOptions)
+        self.n = n = require_count("n", n)
+        if max_episode_steps is not None:
+            require_count("max_episode_steps", max_episode_steps)
         self.parameters = options.for_task(task).parameters
         self.settings = settings_of(options, task, max_episode_steps=max_episode_steps)
         one_each = options.random_body is not None
@@ -99,6 +110,16 @@ class Simulation:
         """Section states, a view (n, 5)."""
         return states_of(self.walkers)
 
+    @property
+    def terminated(self) -> Flags:
+        """Whose episode ended, but for the horizon, shape (n,)."""
+        return self.ends[0]
+
+    @property
+    def truncated(self) -> Flags:
+        """Whose episode was cut by the horizon or the number of steps, shape (n,)."""
+        return self.ends[1]
+
     def new_infos(self, *, cleared: bool = False) -> Vector:
         """A fresh table of infos, as ``step_many`` fills it; of zeros if not every walker's are to be filled."""
         return (np.zeros if cleared else np.empty)((self.n, self.info.size))
@@ -110,7 +131,7 @@ class Simulation:
 
     def note_failures(self) -> None:
         """Count the solver's failures among the steps just made."""
-        self.solver_failures += int(np.count_nonzero(self.falls[self.ends[0]] == _SOLVER))
+        self.solver_failures += int(np.count_nonzero(self.falls[self.terminated] == _SOLVER))
 
     def start(
         self, mask: Flags, generators: list[np.random.Generator], infos: Vector | None = None
@@ -165,7 +186,7 @@ class Simulation:
         """Reset options as numbers, or ``ValueError``."""
         checked: dict[str, Any] = {}
         known = (*RESET_OPTIONS, *self.task.commands)
-        for key in options:
+        for key in require_mapping("options", options):
             if key not in known:
                 raise ValueError(
                     f"reset option {key!r} is not one of {', '.join(known)} (task {self.task.name}){suggestion(key, known)}"
@@ -180,6 +201,14 @@ class Simulation:
             elif name in options:
                 checked[name] = require_array(name, options[name], (len(fields),), low, high, "[]")
         return checked
+
+    def require_actions(
+        self, name: str, value: ArrayLike, shape: tuple[int, ...]
+    ) -> NDArray[np.float32]:
+        """Actions as float32 numbers, NaN included, of a shape; an array that is this already is returned as it is."""
+        if type(value) is np.ndarray and value.dtype == _SINGLE and value.shape == shape:
+            return value
+        return require_shape(name, value, shape).astype(np.float32)
 
     def step_one(self, infos: Vector) -> bool:
         """Step the only walker by ``actions``; return whether they are numbers, else nothing has changed."""

@@ -9,6 +9,7 @@ from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from lean_yaw_env.envs.simulation import Simulation
+from lean_yaw_env.validation import require_mapping
 
 State = dict[str, NDArray[Any]]
 """Arrays by name; ``walkers`` and ``tasks`` are records with named fields."""
@@ -52,9 +53,10 @@ def restore(simulation: Simulation, state: State) -> list[np.random.Generator]:
     forms = {name: (array.shape, array.dtype) for name, array in own.items()}
     forms["generators"] = ((simulation.n, _WORDS), np.dtype(np.uint64))
     for name, (shape, kind) in forms.items():
-        given = state.get(name)
-        if given is None or given.shape != shape or given.dtype != kind:
-            found = "nothing" if given is None else f"shape {given.shape} of {given.dtype}"
+        given = require_mapping("state", state).get(name)
+        if not isinstance(given, np.ndarray) or given.shape != shape or given.dtype != kind:
+            is_array = isinstance(given, np.ndarray)
+            found = f"shape {given.shape} of {given.dtype}" if is_array else repr(given)
             raise ValueError(f"state must hold {name!r} in shape {shape} of {kind}, got {found}")
         for field in given.dtype.names or ():
             values = given[field]
@@ -81,8 +83,9 @@ def from_plain(simulation: Simulation, arrays: dict[str, NDArray[Any]]) -> State
     for name in ("walkers", "tasks"):
         kind = getattr(simulation, name).dtype
         words = arrays.get(name)
-        if words is None or words.ndim != 2 or 8 * words.shape[1] != kind.itemsize:
-            raise ValueError(f"snapshot must hold {name!r} in rows of {kind.itemsize // 8} words")
+        size = kind.itemsize // 8
+        if not isinstance(words, np.ndarray) or words.ndim != 2 or words.shape[1] != size:
+            raise ValueError(f"snapshot must hold {name!r} in rows of {size} words, got {words!r}")
         state[name] = np.ascontiguousarray(words, dtype=np.uint64).view(kind)[:, 0]
     return state
 

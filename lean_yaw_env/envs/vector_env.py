@@ -23,7 +23,13 @@ from lean_yaw_env.envs.tasks import Task, task_named
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.rendering.pygame_renderer import LEAST_SIZE, Renderer
 from lean_yaw_env.threads import MOST_THREADS, share_out
-from lean_yaw_env.validation import require_choice, require_count
+from lean_yaw_env.validation import (
+    require_choice,
+    require_count,
+    require_flag,
+    require_mapping,
+    require_seed,
+)
 
 _RENDER_MODES = ("rgb_array",)
 Observations = NDArray[np.float32]
@@ -87,15 +93,18 @@ class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float
         if render_mode is not None:
             require_choice("render_mode", render_mode, _RENDER_MODES)
             require_count("num_envs with a render_mode", num_envs, 1, MOST_PICTURES)
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        if not isinstance(autoreset_mode, AutoresetMode):
+            modes = [mode.value for mode in AutoresetMode]
+            autoreset_mode = AutoresetMode(require_choice("autoreset_mode", autoreset_mode, modes))
+        self.autoreset_mode = autoreset_mode
         self.metadata = {
             "autoreset_mode": self.autoreset_mode,
             "render_modes": list(_RENDER_MODES),
             "render_fps": STEPS_PER_SECOND,
         }
         self.render_mode = render_mode
-        self.copy = copy
-        self.step_info = step_info
+        self.copy = require_flag("copy", copy)
+        self.step_info = require_flag("step_info", step_info)
         self.options = EnvOptions.of(options)
         self.task = task_named(task)
         self.simulation = Simulation(
@@ -124,10 +133,10 @@ class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float
         A number seeds walker i by ``seed + i``, a sequence each by its own; None goes on with the generators there are. Other options are
         those of ``WalkerEnv.reset``, for every walker that is reset.
         """
-        placement = dict(options or {})
+        placement = {} if options is None else dict(require_mapping("options", options))
         mask = self._reset_mask(placement.pop("reset_mask", None))
         self.simulation.check_options(placement)
-        self._seed(seed, mask)
+        self._seed(self._require_seeds(seed), mask)
         infos = self.simulation.new_infos(cleared=True) if self._reports_episodes else None
         self._begin(mask, infos)
         if placement:
@@ -202,9 +211,11 @@ class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float
         ValueError
             If it is no such state; nothing has changed then.
         """
-        ended = state.get("ended")
-        if ended is None or ended.shape != (self.num_envs,) or ended.dtype != np.bool_:
-            raise ValueError(f"state must hold 'ended', bool, in shape ({self.num_envs},)")
+        ended = require_mapping("state", state).get("ended")
+        if not _is_flags(ended, self.num_envs):
+            raise ValueError(
+                f"state must hold 'ended', bool, in shape ({self.num_envs},), got {ended!r}"
+            )
         self._generators = restore(self.simulation, state)
         self._ended[:] = ended
         if self._gallery is not None:
@@ -224,11 +235,7 @@ class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float
             self._spec.max_episode_steps = limit
 
     def _require_actions(self, actions: ArrayLike) -> NDArray[np.float32]:
-        chosen = np.asarray(actions, dtype=np.float32)
-        if chosen.shape != self.simulation.actions.shape:
-            raise ValueError(
-                f"actions must have shape ({self.num_envs}, {ACTION_SIZE}), got {chosen.shape}"
-            )
+        chosen = self.simulation.require_actions("actions", actions, (self.num_envs, ACTION_SIZE))
         if np.count_nonzero(np.isfinite(chosen)) < chosen.size:
             bad = ~np.isfinite(chosen).all(axis=1) & ~self._ended
             if bad.any():
@@ -253,30 +260,25 @@ class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float
     def _reset_mask(self, mask: Any) -> NDArray[np.bool_]:
         if mask is None:
             return np.ones(self.num_envs, dtype=np.bool_)
-        if (
-            not isinstance(mask, np.ndarray)
-            or mask.dtype != np.bool_
-            or mask.shape != (self.num_envs,)
-        ):
+        if not _is_flags(mask, self.num_envs):
             raise ValueError(
                 f"reset_mask must be a bool array of shape ({self.num_envs},), got {mask!r}"
             )
         if not mask.any():
-            raise ValueError("reset_mask must be true for at least one walker")
+            raise ValueError(f"reset_mask must be true for at least one walker, got {mask}")
         return mask.copy()
 
-    def _seed(self, seed: int | Sequence[int | None] | None, mask: NDArray[np.bool_]) -> None:
+    def _require_seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        """A seed for each walker."""
+        if not isinstance(seed, (list, tuple, np.ndarray)):
+            first = require_seed("seed", seed)
+            return [None if first is None else first + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(f"seed must be one number or {self.num_envs} of them, got {len(seed)}")
+        return [require_seed(f"seed[{i}]", each) for i, each in enumerate(seed)]
+
+    def _seed(self, seeds: list[int | None], mask: NDArray[np.bool_]) -> None:
         """Give the walkers of the mask their generators."""
-        if seed is None:
-            seeds: list[int | None] = [None] * self.num_envs
-        elif isinstance(seed, (int, np.integer)):
-            seeds = [int(seed) + i for i in range(self.num_envs)]
-        else:
-            seeds = list(seed)
-            if len(seeds) != self.num_envs:
-                raise ValueError(
-                    f"seed must be one number or {self.num_envs} of them, got {len(seeds)}"
-                )
         if self._generators is None:
             self._generators = [seeding.np_random(s)[0] for s in seeds]
             return
@@ -303,3 +305,8 @@ class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float
             return {}
         falls = np.where(mask, self.simulation.falls, 0)
         return self.simulation.info.many(infos, falls, mask)
+
+
+def _is_flags(value: Any, n: int) -> bool:
+    """Whether it is a bool array (n,)."""
+    return isinstance(value, np.ndarray) and value.dtype == np.bool_ and value.shape == (n,)

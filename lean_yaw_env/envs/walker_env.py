@@ -18,7 +18,7 @@ from lean_yaw_env.envs.snapshots import PickledWithState, State, restore, state_
 from lean_yaw_env.envs.tasks import Task, task_named
 from lean_yaw_env.rendering.filming import Frame
 from lean_yaw_env.rendering.pygame_renderer import Renderer
-from lean_yaw_env.validation import require_choice
+from lean_yaw_env.validation import require_choice, require_seed
 
 _KEYS = {
     key: np.array(action, dtype=np.float32)
@@ -111,8 +111,9 @@ class WalkerEnv(PickledWithState, gym.Env[NDArray[np.float32], NDArray[np.float3
         (``Task.commands``), in place of what would be drawn.
         """
         simulation = self.simulation
-        simulation.check_options(options or {})
-        super().reset(seed=seed)
+        options = {} if options is None else options
+        simulation.check_options(options)
+        super().reset(seed=require_seed("seed", seed))
         simulation.start(_ONE, [self.np_random], self._infos)
         if options:
             simulation.place(_ONE, options, self._infos)
@@ -126,9 +127,7 @@ class WalkerEnv(PickledWithState, gym.Env[NDArray[np.float32], NDArray[np.float3
         if not self.is_under_way:
             raise ResetNeeded("call reset() before the first step and after the end of an episode")
         simulation = self.simulation
-        chosen = np.asarray(action, dtype=np.float32)
-        if chosen.shape != (ACTION_SIZE,):
-            raise ValueError(f"action must have shape ({ACTION_SIZE},), got {chosen.shape}")
+        chosen = simulation.require_actions("action", action, (ACTION_SIZE,))
         simulation.actions[0] = chosen
         if not simulation.step_one(self._infos):
             raise ValueError(f"action must be numbers in [-1, 1], got {chosen.tolist()}")

@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from lean_yaw_env.errors import FellError, NoGaitError
 from lean_yaw_env.multibody.kinematics import Vector
 from lean_yaw_env.multibody.walker import MultibodyStep, MultibodyWalker
+from lean_yaw_env.validation import require_array, require_count, require_instance, require_number
 
 PASSIVE_STATE_FIELDS = (
     "heading", "stance_pitch", "ankle_angle", "stance_pitch_rate", "ankle_rate", "inter_leg_rate", "inter_leg_angle",
@@ -123,13 +124,15 @@ def find_passive_gait(
     Raises
     ------
     ValueError
-        If ``guess`` has another shape.
+        If an argument is outside its range.
     NoGaitError
         If the walker falls on the way or the iteration does not converge.
     """
-    state = np.array(guess, dtype=np.float64)
-    if state.shape != (len(PASSIVE_STATE_FIELDS),):
-        raise ValueError(f"guess must have shape (7,), got {state.shape}")
+    require_instance("walker", walker, MultibodyWalker)
+    state = require_array("guess", guess, (len(PASSIVE_STATE_FIELDS),))
+    require_number("difference", difference, 0.0, 0.1, "()")
+    require_number("residual", residual, 0.0, 1.0, "()")
+    require_count("max_iterations", max_iterations)
     tried = f"Newton's method from {np.array2string(state, precision=6)}"
     error = np.inf
     try:

@@ -28,7 +28,13 @@ from lean_yaw_env.multibody.kinematics import (
     Vector,
 )
 from lean_yaw_env.multibody.phase import PhaseEnd, integrate
-from lean_yaw_env.validation import require_array, require_choice, require_finite, require_number
+from lean_yaw_env.validation import (
+    require_array,
+    require_choice,
+    require_finite,
+    require_flag,
+    require_number,
+)
 
 SwingMode = Literal["held", "passive"]
 
@@ -188,6 +194,7 @@ class MultibodyWalker(Body):
         SolverError
             If the integrator fails.
         """
+        require_flag("trajectory", trajectory)
         phase, start = self._start(
             state, stance, inter_leg_angle, mass_offset, previous_offset, swing, swing_rate
         )

@@ -4,20 +4,29 @@ from __future__ import annotations
 
 import base64
 import csv
+import hashlib
 import io
 import itertools
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from html import escape
 from pathlib import Path
 
+import numba
+import numpy as np
+import scipy
+
+import lean_yaw_env
 from lean_yaw_env.errors import LeanYawError
 from lean_yaw_env.extras import needs_extra
-from lean_yaw_env.files import write_text
-from lean_yaw_env.paper.checks import VERDICTS, Check, Columns, Result
+from lean_yaw_env.files import locked, read_json, write_json, write_text
+from lean_yaw_env.paper.checks import VERDICTS, Check, Columns, Result, Section
 from lean_yaw_env.paper.registry import CLASSICS, PAPER, Piece, pieces_named
 
+_FINISHED = ".finished"
+"""Folder with what is finished, a file for each piece."""
 _TITLES = {
     PAPER: "Skateboards, bicycles and three-dimensional walkers: the paper beside ours",
     CLASSICS: "The classics of passive walking and of bicycles: their numbers beside ours",
@@ -95,8 +104,8 @@ class Reproduction:
 def reproduce(names: Sequence[str], folder: Path, *, progress: bool = False) -> Reproduction:
     """Compute pieces of the paper and write their pictures (PNG) and numbers (CSV).
 
-    Each file is written whole or not at all as soon as it is known, so that an interruption costs
-    only the piece in work.
+    Each file is written whole or not at all as soon as it is known. What an earlier call with the same code has finished in this folder is
+    not computed again, so that an interruption costs only the piece in work.
 
     Parameters
     ----------
@@ -111,29 +120,68 @@ def reproduce(names: Sequence[str], folder: Path, *, progress: bool = False) -> 
     ValueError
         If a name is unknown, or the folder is a file.
     LeanYawError
-        If a piece cannot be computed; names it.
+        If a piece cannot be computed; names it. ``BusyError`` if another process is at work in the folder.
     """
     with needs_extra("analysis"):
         from tqdm.auto import tqdm
     pieces = pieces_named(names)
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"the output folder {str(folder)!r} is a file")
-    folder.mkdir(parents=True, exist_ok=True)
-    done = []
-    bar = tqdm(pieces, unit="piece", disable=not progress)
-    for piece in bar:
-        bar.set_description(piece.name)
-        try:
-            result = piece.make()
-        except LeanYawError as error:
-            raise LeanYawError(f"{piece.name}: {error}") from error
-        for stem, columns in result.tables.items():
-            write_columns(folder / f"{stem}.csv", columns)
-        picture = folder / f"{piece.name}.png" if result.picture else None
-        if result.picture and picture:
-            result.picture(picture)
-        done.append(Reproduced(piece, result, picture))
+    (folder / _FINISHED).mkdir(parents=True, exist_ok=True)
+    code, done = _code_digest(), list[Reproduced]()
+    with locked(folder), tqdm(pieces, unit="piece", disable=not progress) as bar:
+        for piece in bar:
+            bar.set_description(piece.name)
+            done.append(_finished(piece, folder, code) or _reproduced(piece, folder, code))
     return Reproduction(tuple(done))
+
+
+def _reproduced(piece: Piece, folder: Path, code: str) -> Reproduced:
+    """Compute a piece, write its files, and note that it is finished."""
+    try:
+        result = piece.make()
+    except LeanYawError as error:
+        raise LeanYawError(f"{piece.name}: {error}") from error
+    for stem, columns in result.tables.items():
+        write_columns(folder / f"{stem}.csv", columns)
+    picture = folder / f"{piece.name}.png" if result.picture else None
+    if result.picture and picture:
+        result.picture(picture)
+    record = {
+        "code": code,
+        "checks": [asdict(check) for check in result.checks],
+        "tables": list(result.tables),
+        "sections": [asdict(section) for section in result.sections],
+        "picture": picture is not None,
+    }
+    write_json(folder / _FINISHED / f"{piece.name}.json", record)
+    return Reproduced(piece, result, picture)
+
+
+def _finished(piece: Piece, folder: Path, code: str) -> Reproduced | None:
+    """A piece that the same code has finished in this folder; None if it has not, or a file is missing or damaged."""
+    try:
+        record = read_json(folder / _FINISHED / f"{piece.name}.json")
+        if record["code"] != code:
+            return None
+        checks = [Check(**check) for check in record["checks"]]
+        sections = tuple(Section(**section) for section in record["sections"])
+        result = Result(checks, {stem: {} for stem in record["tables"]}, sections=sections)
+        picture = folder / f"{piece.name}.png" if record["picture"] else None
+    except (ValueError, KeyError, TypeError):
+        return None
+    files = [folder / f"{stem}.csv" for stem in result.tables] + ([picture] if picture else [])
+    return Reproduced(piece, result, picture) if all(map(Path.is_file, files)) else None
+
+
+@lru_cache(maxsize=1)
+def _code_digest() -> str:
+    """A digest of all that the numbers depend on."""
+    package = Path(str(lean_yaw_env.__file__)).parent
+    digest = hashlib.sha256(f"{np.__version__} {scipy.__version__} {numba.__version__}".encode())
+    for file in sorted([*package.rglob("*.py"), *package.rglob("*.csv")]):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
 
 
 def write_columns(path: Path, columns: Columns) -> None:

@@ -27,6 +27,7 @@ from lean_yaw_env.rendering.palette import (
     mixed,
     unit_colour,
 )
+from lean_yaw_env.validation import require_instance
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,6 +55,7 @@ def draw_walker(parameters: WalkerParameters, path: str | os.PathLike[str]) -> N
         If matplotlib is not installed.
     """
     require_ending(path, ENDINGS)
+    require_instance("parameters", parameters, WalkerParameters)
     widths = (1.7, 0.9 + parameters.hip_width, 1.0 + parameters.hip_width)
     figure = new_figure(_INCHES * sum(widths), _INCHES * _HEIGHT + 1.0)
     side, rear, top = figure.subplots(1, 3, width_ratios=widths)

@@ -18,7 +18,12 @@ from lean_yaw_env.rendering.geometry import Pose
 from lean_yaw_env.rendering.motion import SECONDS_PER_TIME_UNIT, SWING_SHARE, StepMotion
 from lean_yaw_env.rendering.pygame_renderer import SIZE, Renderer
 from lean_yaw_env.rendering.scene import Scene, status_lines
-from lean_yaw_env.validation import require_number
+from lean_yaw_env.validation import (
+    require_flag,
+    require_instance,
+    require_number,
+    require_one_or_each,
+)
 from lean_yaw_env.walker import Walk, Walker
 
 HOLD_SECONDS = 1.0
@@ -73,6 +78,8 @@ def film(
     gymnasium.error.DependencyNotInstalled
         If what writes such a file is not installed.
     """
+    require_instance("walker", walker, Walker)
+    require_flag("progress", progress)
     require_number("fps", fps, 1, 120)
     file = FilmFile(path, fps)
     require_number("seconds_per_time_unit", seconds_per_time_unit, 0.0, 100.0, "(]")
@@ -83,12 +90,7 @@ def film(
     walk = walker.walk(n_steps, **start, **command)
     commanded = None
     if commanded_heading is not None:
-        commanded = np.asarray(commanded_heading, dtype=float)
-        if commanded.shape not in ((), (n_steps,)):
-            raise ValueError(
-                f"commanded_heading must be one number or {n_steps}, got shape {commanded.shape}"
-            )
-        commanded = np.broadcast_to(commanded, n_steps)
+        commanded = require_one_or_each("commanded_heading", commanded_heading, n_steps)
     motions = _motions(walker, walk, swing_share)
     ends = np.cumsum([motion.duration for motion in motions])
     times = np.arange(0.0, ends[-1], 1.0 / (file.rate * seconds_per_time_unit))

@@ -22,7 +22,7 @@ from lean_yaw_env.parameters import (
     require_foot,
     require_mass_offset,
 )
-from lean_yaw_env.validation import require_array, require_number
+from lean_yaw_env.validation import require_array, require_instance, require_number
 from lean_yaw_env.walker import OTHER_FOOT, SIDE
 
 FOOT_HALF_LENGTH = 0.16
@@ -172,8 +172,9 @@ def walker_shape(parameters: WalkerParameters, pose: Pose) -> WalkerShape:
     the leg's frame is L = F Ra(ankle angle), the hip a leg length along its second axis, the axle its third. The swing leg is turned by the
     inter-leg angle about the axle, and its ankle keeps the cylinder's axis horizontal.
     """
+    require_instance("pose", pose, Pose)
     heading, pitch, ankle_angle = (float(value) for value in pose.state[:3])
-    radius = parameters.foot_radius
+    radius = require_instance("parameters", parameters, WalkerParameters).foot_radius
     ankle_axis = np.array([math.sin(parameters.ankle_tilt), -math.cos(parameters.ankle_tilt), 0.0])
     reference = np.array([pose.contact[0], 0.0, pose.contact[1]])
     ahead = np.array([math.cos(heading), 0.0, -math.sin(heading)])

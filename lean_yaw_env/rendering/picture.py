@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,7 @@ from lean_yaw_env.parameters import Foot, Vector
 from lean_yaw_env.rendering.figures import ENDINGS, new_figure, save_figure
 from lean_yaw_env.rendering.footprints import footprint_length, footprint_outlines
 from lean_yaw_env.rendering.palette import FOOT_COLOURS, INK, STRONG_GRID, unit_colour
+from lean_yaw_env.validation import require_mapping, require_number, require_numbers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,6 +67,9 @@ def draw_footprints(
     ValueError
         If there are not as many axes as walks, or no walks.
     """
+    _require_walks(walks, foot_radius)
+    if not isinstance(places, tuple) or places:
+        require_numbers("places", places, 2)
     axes = list(np.ravel(np.asarray(axes, dtype=object)))
     if not walks or len(axes) != len(walks):
         raise ValueError(f"axes must be as many as walks, 1 or more: {len(axes)} and {len(walks)}")
@@ -132,7 +136,15 @@ def save_footprints(
         If matplotlib is not installed.
     """
     require_ending(path, ENDINGS)
+    _require_walks(walks, foot_radius)
     save_figure(footprint_figure(walks, foot_radius=foot_radius)[0], path)
+
+
+def _require_walks(walks: Any, foot_radius: Any) -> None:
+    for name, walk in require_mapping("walks", walks).items():
+        if not hasattr(walk, "footprints"):
+            raise ValueError(f"walks must hold walks, got {walk!r} for {name!r}")
+    require_number("foot_radius", foot_radius, 0.0, 1.0, "[)")
 
 
 def _extent(walks: Mapping[str, WalkRecord], places: ArrayLike) -> tuple[Vector, Vector]:

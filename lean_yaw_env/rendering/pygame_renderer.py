@@ -16,7 +16,7 @@ from lean_yaw_env.rendering.palette import BACKGROUND
 from lean_yaw_env.rendering.perspective import draw_perspective_view
 from lean_yaw_env.rendering.scene import Scene
 from lean_yaw_env.rendering.top_view import draw_top_view
-from lean_yaw_env.validation import require_count, require_number
+from lean_yaw_env.validation import require_count, require_instance, require_number
 
 SIZE = (960, 540)
 """Width and height of a picture, pixels."""
@@ -55,7 +55,7 @@ class Renderer:
 
     def frame(self, scene: Scene) -> NDArray[np.uint8]:
         """The picture of a scene; shape (height, width, 3), uint8. Needs and opens no display."""
-        self._draw(scene)
+        self._draw(require_instance("scene", scene, Scene))
         return self._canvas.array()
 
     def show(self, scene: Scene, fps: float = 30.0) -> bool:
@@ -69,6 +69,7 @@ class Renderer:
             If there is no display; ``frame`` needs none.
         """
         rate = require_number("fps", fps, 0.0, 1000.0, "(]")
+        require_instance("scene", scene, Scene)
         if self._closed_by_user:
             return False
         window = self._opened_window()

@@ -11,7 +11,14 @@ import numpy as np
 
 from lean_yaw_env.parameters import Foot, Vector, WalkerParameters, require_foot
 from lean_yaw_env.rendering.geometry import Pose
-from lean_yaw_env.validation import require_array, require_finite, require_number
+from lean_yaw_env.validation import (
+    require_array,
+    require_count,
+    require_finite,
+    require_instance,
+    require_number,
+    require_text,
+)
 
 
 class Goal(NamedTuple):
@@ -62,10 +69,11 @@ class Scene:
     lines: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        if not isinstance(self.parameters, WalkerParameters):
-            raise ValueError(f"parameters must be WalkerParameters, got {self.parameters!r}")
-        if not isinstance(self.pose, Pose):
-            raise ValueError(f"pose must be a Pose, got {self.pose!r}")
+        require_instance("parameters", self.parameters, WalkerParameters)
+        require_instance("pose", self.pose, Pose)
+        for name in ("feet", "goals", "lines"):
+            if not isinstance(getattr(self, name), (list, tuple)):
+                raise ValueError(f"{name} must be a sequence, got {getattr(self, name)!r}")
         footprints = require_array("footprints", self.footprints, (None, 2))
         headings = require_array("headings", self.headings, (len(footprints),))
         feet = tuple(require_foot(foot) for foot in self.feet)
@@ -109,6 +117,12 @@ def status_lines(
     status: str = "walking",
 ) -> tuple[str, ...]:
     """The usual words beside a walk's picture, the same from a film and an environment."""
+    require_count("step", step, 0)
+    numbers = {"time": time, "speed": speed, "heading": heading}
+    for name, value in {**numbers, "commanded_heading": commanded_heading}.items():
+        if value is not None or name == "time":
+            require_finite(name, value)
+    require_text("status", status)
     lines = [f"step {step}", f"time {time:.1f}"]
     if speed is not None:
         lines.append(f"speed {speed:.3f}")

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lean_yaw_env.validation import require_finite, require_number
+from lean_yaw_env.validation import require_finite, require_instance, require_number
 from lean_yaw_env.vehicles.stability import FloatArray
 
 _INERTIA_SLACK = 1e-9
@@ -130,6 +130,9 @@ class BicycleParameters:
     front_wheel: Wheel = field(default_factory=lambda: Wheel(0.35, 3.0, 0.1405, 0.28))
 
     def __post_init__(self) -> None:
+        for name, kind in (("wheel", Wheel), ("frame", FrameBody)):
+            for end in ("rear", "front"):
+                require_instance(f"{end}_{name}", getattr(self, f"{end}_{name}"), kind)
         require_number("wheelbase", self.wheelbase, 0.0, math.inf, "()")
         require_finite("trail", self.trail)
         require_number("steer_axis_tilt", self.steer_axis_tilt, -math.pi / 2, math.pi / 2, "()")
@@ -199,6 +202,7 @@ def canonical_matrices(parameters: BicycleParameters) -> CanonicalMatrices:
 
     The stiffness due to gravity is not multiplied by g.
     """
+    require_instance("parameters", parameters, BicycleParameters)
     w, c = parameters.wheelbase, parameters.trail
     rear, front = (
         [

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.optimize import root
 
+from lean_yaw_env.validation import require_array
 from lean_yaw_env.vehicles.stability import FloatArray
 
 _NEGLIGIBLE = 1e-14
@@ -44,6 +45,14 @@ class CharacteristicPolynomial:
         cls, mass: FloatArray, damping: FloatArray, static: FloatArray, dynamic: FloatArray
     ) -> CharacteristicPolynomial:
         """Expand the determinant of eq. (4), each matrix of shape (2, 2)."""
+        mass, damping, static, dynamic = (
+            require_array(name, matrix, (2, 2))
+            for name, matrix in zip(
+                ("mass", "damping", "static", "dynamic"),
+                (mass, damping, static, dynamic),
+                strict=True,
+            )
+        )
         largest = float(np.max(np.abs(dynamic)))
         scale = float(np.sqrt(np.max(np.abs(static)) / largest)) if largest > 0.0 else 1.0
         zero = np.zeros((2, 2))

@@ -9,7 +9,7 @@ from itertools import pairwise, permutations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lean_yaw_env.validation import require_vector
+from lean_yaw_env.validation import require_instance, require_vector
 from lean_yaw_env.vehicles.bicycle import LinearBicycle
 from lean_yaw_env.vehicles.stability import ComplexArray, FloatArray
 
@@ -112,6 +112,7 @@ def follow_eigenvalues(bicycle: LinearBicycle, speeds: ArrayLike) -> EigenvalueB
     ValueError
         If a speed is negative or not finite.
     """
+    require_instance("bicycle", bicycle, LinearBicycle)
     requested = require_vector("speeds", speeds, 0.0, math.inf, "[)")
     start, names = _start(bicycle)
     ordered, place = np.unique(requested, return_inverse=True)

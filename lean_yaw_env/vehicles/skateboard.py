@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lean_yaw_env.validation import require_finite, require_number, require_vector
+from lean_yaw_env.validation import require_finite, require_number, require_numbers, require_vector
 from lean_yaw_env.vehicles.stability import (
     ComplexArray,
     FloatArray,
@@ -110,10 +110,7 @@ class Skateboard:
         ValueError
             If a lean or a speed is not finite.
         """
-        angles, speeds = np.asarray(lean, dtype=np.float64), np.asarray(speed, dtype=np.float64)
-        for name, values in (("lean", angles), ("speed", speeds)):
-            if not np.all(np.isfinite(values)):
-                raise ValueError(f"{name} must be finite, got {values!r}")
+        angles, speeds = require_numbers("lean", lean), require_numbers("speed", speed)
         return np.asarray(speeds**2 * self.curvature_per_lean() * angles)
 
     def equation_of_motion(self, speed: float) -> LeanEquation:

@@ -40,7 +40,7 @@ def stable_speed_range(vehicle: object) -> SpeedRange | None:
         If no rule is registered for this type.
     """
     raise TypeError(
-        f"no stable speed range is known for {type(vehicle).__name__}; "
+        f"vehicle must be of a class with a known stable speed range, got {vehicle!r}; "
         "register one with stable_speed_range.register"
     )
 

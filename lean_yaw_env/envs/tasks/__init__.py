@@ -8,7 +8,7 @@ from lean_yaw_env.envs.tasks.task import Command, Feature, Formula, Metric, Task
 from lean_yaw_env.envs.tasks.walking import PUSH, WALK
 from lean_yaw_env.envs.tasks.waypoints import WAYPOINT, WAYPOINT_GOAL
 from lean_yaw_env.registration import name_of_task, register_id
-from lean_yaw_env.validation import suggestion
+from lean_yaw_env.validation import require_instance, suggestion
 
 TASKS = {
     task.name: task
@@ -49,11 +49,12 @@ def register_task(task: Task, env_id: str, *, reward_threshold: float | None = N
     Raises
     ------
     ValueError
-        If another task has that name.
+        If another task has that name, or ``env_id`` is not of that form.
     """
-    if TASKS.setdefault(task.name, task) is not task:
+    if TASKS.get(require_instance("task", task, Task).name, task) is not task:
         raise ValueError(f"name must be a task's own, got {task.name!r}, which there is already")
     register_id(env_id, task.name, reward_threshold=reward_threshold)
+    TASKS[task.name] = task
 
 
 __all__ = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -11,7 +12,8 @@ import numpy as np
 
 from lean_yaw_env.envs.state import WALKER_FIELDS, Field, Records, record_type
 from lean_yaw_env.kernel.compilation import formula
-from lean_yaw_env.parameters import Vector, WalkerParameters
+from lean_yaw_env.parameters import Range, Vector, WalkerParameters
+from lean_yaw_env.validation import require_instance, require_mapping
 
 Formula = Callable[[Any, Any], Any]
 """Of a walker's record and the task's; decorated by ``formula``."""
@@ -37,6 +39,15 @@ def derive_nothing(walker: Any, task: Any) -> None:
 def observe_nothing(walker: Any, task: Any) -> Any:
     """The features of a task that has none."""
     return ()
+
+
+TASK_RANGES = (
+    Range("horizon", 0.0, math.inf, "(]"),
+    Range("max_offset_change", 0.0, 2.0),
+    Range("push_level", 0.0, 10.0),
+)
+"""Of the options that have a default of each task's own."""
+_PUMPING, _GOAL_RADIUS = Range("pumping", -1.0, 1.0), Range("goal_radius", 0.0, math.inf, "()")
 
 
 class Feature(NamedTuple):
@@ -86,7 +97,8 @@ class Task:
     Raises
     ------
     ValueError
-        If a metric or a command names a field that there is not, or a field has the name of one of the walker's.
+        If a value is outside its range, a metric or a command names a field that there is not, or a field has the name of one of the
+        walker's.
     """
 
     name: str
@@ -134,18 +146,33 @@ class Task:
     """The metric, or "return", by which agents are compared: it must be meaningful without survival."""
 
     def __post_init__(self) -> None:
+        for name in ("metrics", "commands"):
+            require_mapping(name, getattr(self, name))
+        if not all(
+            isinstance(each, Field) for each in require_instance("fields", self.fields, tuple)
+        ):
+            raise ValueError(f"fields must be of the class Field, got {self.fields!r}")
+        require_instance("parameters", self.parameters, WalkerParameters)
+        for limits in (*TASK_RANGES, _PUMPING, _GOAL_RADIUS):
+            limits.require(getattr(self, limits.name))
         common = {field.name for field in WALKER_FIELDS}
         own = {field.name for field in self.fields}
         if common & own:
             raise ValueError(
                 f"fields must not have names of the walker's record, got {', '.join(sorted(common & own))}"
             )
-        named = [self.heading_field, *(self.goal_fields or ())]
-        named += [name for metric in self.metrics.values() for name in metric[:2]]
-        named += [name for command in self.commands.values() for name in command.fields]
-        for name in named:
-            if name is not None and name not in common | own:
-                raise ValueError(f"task {self.name} names a field that it has not: {name!r}")
+        named = {
+            "heading_field": [self.heading_field],
+            "goal_fields": require_instance("goal_fields", self.goal_fields or (), tuple),
+            "metrics": [name for metric in self.metrics.values() for name in metric[:2]],
+            "commands": [name for command in self.commands.values() for name in command.fields],
+        }
+        for where, names in named.items():
+            for name in names:
+                if name is not None and name not in common | own:
+                    raise ValueError(
+                        f"{where} must name fields of the task {self.name}, got {name!r}"
+                    )
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Task, tuple(getattr(self, each.name) for each in fields(self))
