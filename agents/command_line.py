@@ -344,7 +344,8 @@ def capture(
     runs: Runs = Path("runs"),
     starts: Annotated[int, Option(help="In the box of starts.")] = 1024,
     points: Annotated[int, Option(help="To a side of the picture's plane.")] = 61,
-    friction_limit: Annotated[float, Option(help="Largest ratio of tangential to normal force; inf is the tasks' own.")] = float("inf"),
+    friction_limit: Annotated[list[float] | None, Option(help="Largest ratio of tangential to normal force; several may be given. The tasks' own is "
+        "inf.", show_default=False)] = None,
     as_json: AsJson = False,
 ) -> None:  # fmt: skip
     """Hold agents against what can be saved: an exhaustive search over two chosen steps, each followed by the paper's controller."""
@@ -352,7 +353,7 @@ def capture(
 
     reports, notes = examine_captures(
         tasks_in(task or ["Push"]), names_in([agents]), path=agent_path, runs=runs,
-        starts=starts, points=points, friction_limit=friction_limit,
+        starts=starts, points=points, friction_limits=friction_limit or [float("inf")],
     )  # fmt: skip
     if as_json:
         typer.echo(dumps([row for each in reports for row in each.rows()], indent=2))

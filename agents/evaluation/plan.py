@@ -23,6 +23,7 @@ from tqdm import tqdm
 import lean_yaw_env
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.files import written_whole
+from lean_yaw_env.reporting import uninterrupted
 from lean_yaw_env.validation import require_count
 
 from ..agent import Agent
@@ -226,7 +227,8 @@ def _outcomes(
             yield chunk, _run_chunk(chunk, cache)
         return
     with _pool(min(processes, len(waiting))) as pool:
-        futures = {pool.submit(_run_chunk, chunk, cache): chunk for chunk in waiting}
+        with uninterrupted():
+            futures = {pool.submit(_run_chunk, chunk, cache): chunk for chunk in waiting}
         for future in as_completed(futures):
             yield futures[future], future.result()
 

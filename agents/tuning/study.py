@@ -155,7 +155,7 @@ def result_words(trial: FrozenTrial | None) -> str:
 
 def _study(tuning: Tuning, space: Space, storage: Path | None) -> optuna.Study:
     """The file's study, a new one where there is none."""
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
     name = f"{tuning.agent} {tuning.task}"
     if storage is not None:
         storage.parent.mkdir(parents=True, exist_ok=True)
