@@ -68,6 +68,7 @@ COMMANDS: dict[tuple[str, str], tuple[list[str], dict[str, tuple[str, ...]]]] = 
     ("lean-yaw", "play"): (["LeanYaw/Level-v0"], {"ENV_ID": ("no-such-name", "LeanYaw/Heading-v7"), "--speed": POSITIVE, "--seed": SEEDS}),
     ("lean-yaw", "view"): ([], {"--walk": ("no-such-file.json",), "--port": (*SEEDS, "99999")}),
     ("lean-yaw", "reproduce"): (["table1"], {"NAMES": TEXT, "--out": ()}),
+    ("lean-yaw", "findings"): ([], {"--out": ()}),
     ("agents", "train"): (SMALL, TRAIN),
     ("train.py", ""): (SMALL, TRAIN),
     ("agents", "tune"): (
