@@ -175,7 +175,12 @@ def test_a_bad_value_ends_a_command_with_status_2_and_words(
         result = CliRunner().invoke(APPS[key[0]], [key[1], *given] if key[1] else given)
         signal.alarm(0)
         words = result.output + str(result.stderr)
-        named = [option, option.strip("-").replace("-", "_").lower(), repr(value), value.split("=")[0]]
+        named = [
+            option,
+            option.strip("-").replace("-", "_").lower(),
+            repr(value),
+            value.split("=")[0],
+        ]
         is_clear = any(name and name in words for name in named) or (not value and "'.'" in words)
         if result.exit_code != 2 or not isinstance(result.exception, SystemExit) or not is_clear:
             wrong.append(
