@@ -287,10 +287,21 @@ def view(
         typer.echo(f"the page is at {server.address} until Ctrl-C")
         try:
             server.wait()
-        except KeyboardInterrupt:
+        finally:
             server.close()
 
     return Output({"address": server.address}, serve)
+
+
+@command()
+def findings(
+    out: Annotated[Path, typer.Option(help="Folder for findings.md, findings.csv and images.")],
+) -> Output:
+    """Compute what this software finds beyond the paper: walking on the level, stability over bodies, what chosen steps can save."""
+    from lean_yaw_env.paper.findings import write_findings
+
+    page = write_findings(out, progress=sys.stderr.isatty())
+    return Output({"page": str(page)}, lambda: typer.echo(f"written: {page}"))
 
 
 @command()
