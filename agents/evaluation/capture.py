@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -157,7 +158,14 @@ def _plane(loop: ClosedLoopMap, points: int) -> tuple[tuple[Vector, Vector], Vec
 
 
 def examine_captures(
-    tasks: Sequence[str], names: Sequence[str], *, path: Path | None, runs: Path, **settings: float
+    tasks: Sequence[str],
+    names: Sequence[str],
+    *,
+    path: Path | None,
+    runs: Path,
+    friction_limits: Sequence[float],
+    starts: int,
+    points: int,
 ) -> tuple[list[CaptureReport], dict[str, str]]:
     """Examine agents at tasks, with a progress bar; the reports, and by "task: agent" why one is left out of several.
 
@@ -168,21 +176,25 @@ def examine_captures(
     """
     reports: list[CaptureReport] = []
     notes: dict[str, str] = {}
-    pairs = [(task, name) for task in tasks for name in names]
-    for task, name in tqdm(pairs, desc="capturability", unit="agent", file=sys.stderr):
+    wanted = list(product(tasks, friction_limits, names))
+    for task, limit, name in tqdm(wanted, desc="capturability", unit="agent", file=sys.stderr):
         request = AgentRequest(env_id_of(task), EnvOptions(), path=path, runs=runs)
         try:
             agent = make_agent(name, request)
-            reports.append(examine_capture(name, agent, task, **settings))  # pyright: ignore[reportArgumentType]
+            reports.append(
+                examine_capture(
+                    name, agent, task, friction_limit=limit, starts=starts, points=points
+                )
+            )
         except (ValueError, LeanYawError) as error:
-            if len(pairs) == 1:
+            if len(wanted) == 1:
                 raise
             notes[f"{task}: {name}"] = str(error)
     return reports, notes
 
 
 def write_captures(reports: Sequence[CaptureReport], out: Path) -> list[Path]:
-    """Write capture.csv and a picture for each task into a folder; return the paths."""
+    """Write capture.csv and a picture for each task and friction limit into a folder; return the paths."""
     (out / "images").mkdir(parents=True, exist_ok=True)
     text = io.StringIO()
     writer: csv.DictWriter[str] = csv.DictWriter(text, COLUMNS)
@@ -190,9 +202,11 @@ def write_captures(reports: Sequence[CaptureReport], out: Path) -> list[Path]:
     writer.writerows(row for report in reports for row in report.rows())
     write_text(out / "capture.csv", text.getvalue())
     paths = [out / "capture.csv"]
-    for task in dict.fromkeys(report.task for report in reports):
-        paths.append(out / "images" / f"capture_{task.lower()}.png")
-        save_capture([report for report in reports if report.task == task], paths[-1])
+    for task, limit in dict.fromkeys((report.task, report.friction_limit) for report in reports):
+        floor = "" if limit == float("inf") else f"_friction_{limit:g}"
+        paths.append(out / "images" / f"capture_{task.lower()}{floor}.png")
+        these = [each for each in reports if (each.task, each.friction_limit) == (task, limit)]
+        save_capture(these, paths[-1])
     return paths
 
 
@@ -200,12 +214,14 @@ def show(reports: Sequence[CaptureReport], notes: dict[str, str]) -> None:
     """Print what can be saved and how much of that each agent saves, and what is left out."""
     console = Console()
     table = Table(title="share saved by the agent of the starts that N chosen steps can save")
-    for heading in ("task", "agent", *(f"N = {n}" for n in range(MOST_STEPS + 1)), "beyond", "of all"):  # fmt: skip
-        table.add_column(heading, justify="left" if heading in ("task", "agent") else "right")
+    for heading in ("task", "friction", "agent", *(f"N = {n}" for n in range(MOST_STEPS + 1)), "beyond", "of all"):  # fmt: skip
+        table.add_column(
+            heading, justify="left" if heading in ("task", "friction", "agent") else "right"
+        )
     for report in reports:
         shares = [f"{report.share(n):.3f} of {report.can_be_saved(n):.3f}" for n in range(MOST_STEPS + 1)]  # fmt: skip
         table.add_row(
-            report.task, report.agent, *shares, f"{report.saved_beyond:.3f}", f"{report.is_saved.mean():.3f}"
+            report.task, f"{report.friction_limit:g}", report.agent, *shares, f"{report.saved_beyond:.3f}", f"{report.is_saved.mean():.3f}"
         )  # fmt: skip
     console.print(table)
     for what, why in notes.items():
@@ -233,9 +249,9 @@ def _kind(report: CaptureReport) -> NDArray[np.int64]:
 
 def save_capture(reports: Sequence[CaptureReport], path: Path) -> None:
     """Draw where each agent of a task saves states of the plane and where it loses some that could be saved."""
-    columns = min(len(reports), 4)
+    columns = min(len(reports), 5)
     rows = -(-len(reports) // columns)
-    figure = new_figure(3.0 * columns + 0.6, 3.0 * rows + 1.3)
+    figure = new_figure(2.7 * columns + 0.8, 2.8 * rows + 1.4)
     axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     colours = ListedColormap([colour for _, colour in _KINDS])
     norm = BoundaryNorm(np.arange(len(_KINDS) + 1) - 0.5, len(_KINDS))
@@ -251,8 +267,10 @@ def save_capture(reports: Sequence[CaptureReport], path: Path) -> None:
         place.set_xlabel("ankle angle (rad)")
     for place in axes[:, 0]:
         place.set_ylabel("ankle rate (rad / time unit)")
+    limit = reports[0].friction_limit
+    floor = "" if limit == float("inf") else f", friction limit {limit:g}"
     figure.suptitle(
-        f"{reports[0].task}: share saved of what two chosen steps can save (+ the gait)"
+        f"{reports[0].task}{floor}: share saved of what two chosen steps can save (+ the gait)"
     )
     handles = [Patch(facecolor=colour, edgecolor="0.4", label=text) for text, colour in _KINDS]
     figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
