@@ -30,7 +30,7 @@ app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, no_args_
 Runs = Annotated[Path, Option(help="Where trainings left their folders.")]
 AgentPath = Annotated[
     Path | None,
-    Option(help="Folder of the trained agent; the newest under --runs, or the package's, otherwise."),
+    Option(exists=True, help="Folder of the trained agent; the newest under --runs, or the package's, otherwise."),
 ]  # fmt: skip
 Tasks = Annotated[
     list[str] | None,
@@ -222,7 +222,7 @@ def evaluate(
         path=agent_path,
         runs=None if out is not None and agent_path is None else runs,
         cache=runs / CACHE if cache is None and (out or len(tasks) > 1) else cache,
-        processes=processes or os.cpu_count() or 1,
+        processes=(os.cpu_count() or 1) if processes is None else processes,
         progress=not as_json,
     )
     if evaluation.cache is not None:
@@ -246,7 +246,12 @@ def evaluate(
 
 def names_in(given: Iterable[str]) -> list[str]:
     """Names given one after another or separated by commas, each once."""
-    names = [name for part in given for name in part.replace(",", " ").split()]
+    names: list[str] = []
+    for part in given:
+        some = part.replace(",", " ").split()
+        if not some:
+            raise ValueError(f"a name must not be empty, got {part!r}")
+        names += some
     return list(dict.fromkeys(names))
 
 
@@ -291,7 +296,7 @@ def robustness(
         path=agent_path,
         runs=None if agent_path is None else runs,
         cache=runs / CACHE,
-        processes=processes or os.cpu_count() or 1,
+        processes=(os.cpu_count() or 1) if processes is None else processes,
     )
     keep(f"finished episodes are in {evaluation.cache}; {AGAIN}")
     names = names_in([agents])

@@ -87,9 +87,12 @@ class ObservationLayout:
 
 def require_observation(observation: ArrayLike) -> NDArray[np.float32]:
     """Observations of any task as an array of shape (..., features), or ``ValueError`` if they are not finite numbers."""
-    array = np.asarray(observation)
+    try:
+        array = np.asarray(observation)
+    except ValueError:  # lists of different lengths
+        array = np.empty((), dtype=object)
     if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
         raise ValueError(f"observation must hold finite numbers, got {observation!r}")
     if array.ndim == 0:
-        raise ValueError(f"observation must have shape (..., features), got {array.shape}")
+        raise ValueError(f"observation must have shape (..., features), got {observation!r}")
     return array.astype(np.float32, copy=False)

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.validation import require_choice
 
 
 def env_options(given: Iterable[str]) -> EnvOptions:
@@ -24,13 +25,11 @@ def env_options(given: Iterable[str]) -> EnvOptions:
         name, equals, value = text.partition("=")
         if not equals:
             raise ValueError(f"option must be as NAME=VALUE, got {text!r}")
+        require_choice("option", name, EnvOptions.__dataclass_fields__)
         if name in values:
             raise ValueError(f"option {name!r} must be given once, got it again as {text!r}")
         try:
             values[name] = json.loads(value)
         except json.JSONDecodeError:
             values[name] = value
-    try:
-        return EnvOptions.of(values)
-    except TypeError as error:
-        raise ValueError(str(error)) from error
+    return EnvOptions(**values)

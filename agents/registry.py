@@ -9,10 +9,16 @@ from typing import Literal, get_args
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.errors import NoGaitError
-from lean_yaw_env.files import read_json
+from lean_yaw_env.files import read_json, require_path
 from lean_yaw_env.registration import ALL_ENV_IDS, ALL_TASKS, GOAL_TASK, TASK_VERSIONS
 from lean_yaw_env.rendering.palette import AGENT_COLOURS, INK, unit_colour
-from lean_yaw_env.validation import require_choice
+from lean_yaw_env.validation import (
+    LARGEST_SEED,
+    require_choice,
+    require_count,
+    require_instance,
+    require_text,
+)
 
 from .agent import Agent
 from .controllers.guidance import guided
@@ -47,6 +53,14 @@ class AgentRequest:
     seed: int = 0
     path: Path | None = None
     runs: Path | None = Path("runs")
+
+    def __post_init__(self) -> None:
+        require_text("env_id", self.env_id)
+        require_instance("options", self.options, EnvOptions)
+        require_count("seed", self.seed, 0, LARGEST_SEED)
+        for name in ("path", "runs"):
+            if getattr(self, name) is not None:
+                require_path(getattr(self, name), name)
 
 
 @dataclass(frozen=True)
@@ -124,7 +138,7 @@ def make_agent(name: str, request: AgentRequest) -> Agent:
         If it needs a gait that the walker of these options does not have.
     """
     entry = agent_entry(name)
-    task = task_of(request.env_id)
+    task = task_of(require_instance("request", request, AgentRequest).env_id)
     if task not in entry.tasks:
         raise ValueError(f"{name} is an agent for {', '.join(entry.tasks)}, got {task!r}")
     return entry.make(request)

@@ -19,6 +19,9 @@ from lean_yaw_env.batch import step_batch
 from lean_yaw_env.envs.derivatives import LinearisedSteps
 from lean_yaw_env.envs.goal_env import WaypointGoalEnv
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
+from lean_yaw_env.kernel.compilation import for_types_of
+from lean_yaw_env.kernel.jacobian import careful_derivatives
+from lean_yaw_env.kernel.step import careful_step
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.passive import PassiveWalker
 from lean_yaw_env.registration import TASK_VERSIONS
@@ -37,6 +40,13 @@ def all_work(tasks: Sequence[str] = tuple(TASK_VERSIONS)) -> Iterator[Work]:
     closed = section_map_of(walker)
     passive = PassiveWalker(WalkerParameters(slope=0.009, hip_width=0.05, ankle_tilt=0.3))
     yield "one step", lambda: walker.step(_STATE)
+    yield (
+        "careful steps",
+        lambda: (
+            for_types_of(careful_step, np.empty(0), 0),
+            for_types_of(careful_derivatives, np.empty(0), 0),
+        ),
+    )
     yield "motion within a step", lambda: walker.walk(1, state=_STATE, samples_per_step=2)
     yield "steps of a batch", lambda: step_batch(walker.parameters, _STATE[None], [1.0])
     yield "derivatives of a step", lambda: closed.linear_step(_STATE, 0, None)

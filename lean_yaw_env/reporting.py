@@ -25,11 +25,10 @@ _PATIENCE = 1.0  # seconds from a signal to the end of a process that does not e
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-class Interrupted(KeyboardInterrupt):
-    """Ctrl-C or SIGTERM; its argument is the signal's number."""
-
-
 class _State:
+    """Of the running command: the signal that has interrupted it, what it says then, and whether it has."""
+
+    number: int | None = None
     kept = ""
     is_said = False
 
@@ -63,10 +62,11 @@ def reporting(program: str) -> Iterator[None]:
     try:
         with _watched(program):
             yield
-    except KeyboardInterrupt as interruption:
-        number = interruption.args[0] if isinstance(interruption, Interrupted) else signal.SIGINT
+    except (KeyboardInterrupt, SystemExit) as end:  # a library may have made one of the other
+        if _State.number is None and isinstance(end, SystemExit):
+            raise
         _say_interrupted(program)
-        raise SystemExit(128 + number) from interruption
+        raise SystemExit(128 + (_State.number or signal.SIGINT)) from end
     except BrokenPipeError:
         raise
     except OSError as error:
@@ -94,32 +94,54 @@ def _say_interrupted(program: str) -> None:
 
 
 @contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Hold back Ctrl-C while the block runs; processes begun in it never get it, and their parent decides what becomes of them."""
+    if os.name == "nt":  # where only the parent may answer: see the processes' own initialisation
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
 def _watched(program: str) -> Iterator[None]:
-    """Raise ``Interrupted`` at a signal, and end the process if that does not."""
+    """Raise ``KeyboardInterrupt`` at a signal, and end the process if that does not."""
     is_main = threading.current_thread() is threading.main_thread()
     if not is_main or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
         yield
         return
-    _State.kept, _State.is_said = "", False
+    _State.number, _State.kept, _State.is_said = None, "", False
     reader, writer = socket.socketpair()
     writer.setblocking(False)
     before = {number: signal.signal(number, _interrupt) for number in _SIGNALS}
+    hook, sys.unraisablehook = sys.unraisablehook, _report_unraisable
     wakeup = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
     threading.Thread(target=_end_after_signal, args=(reader, program), daemon=True).start()
     try:
         yield
     finally:
         signal.set_wakeup_fd(wakeup)
+        sys.unraisablehook = hook
         writer.close()
         if signal.getsignal(signal.SIGTERM) is _interrupt:
             for number, handler in before.items():
                 signal.signal(number, handler)
 
 
+def _report_unraisable(unraisable: Any) -> None:
+    """Report an error in a callback of a C library, but for an interruption: the process is ended soon."""
+    if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(unraisable)
+
+
 def _interrupt(number: int, frame: FrameType | None) -> NoReturn:
     for each in _SIGNALS:
         signal.signal(each, signal.SIG_IGN)  # one is enough
-    raise Interrupted(number)
+    _State.number = number
+    raise KeyboardInterrupt
 
 
 def _end_after_signal(reader: socket.socket, program: str) -> None:
@@ -130,5 +152,6 @@ def _end_after_signal(reader: socket.socket, program: str) -> None:
         time.sleep(_PATIENCE)
         for child in multiprocessing.active_children():
             child.kill()
+        time.sleep(_PATIENCE / 2)  # what waited for them ends now
         _say_interrupted(program)
         os._exit(128 + number[0])

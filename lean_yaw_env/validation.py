@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 Choice = TypeVar("Choice", bound=str)
 Instance = TypeVar("Instance")
 
-_LARGEST_SEED = 2**128 - 1
+LARGEST_SEED = 2**128 - 1
 _NUMBERS = (int, float, np.integer, np.floating)
 
 
@@ -83,7 +83,7 @@ def require_text(name: str, value: Any) -> str:
 
 def require_seed(name: str, value: Any) -> int | None:
     """Return the seed of a random number generator, or None, which stands for a new one."""
-    return None if value is None else require_count(name, value, 0, _LARGEST_SEED)
+    return None if value is None else require_count(name, value, 0, LARGEST_SEED)
 
 
 def require_choice(name: str, value: Any, choices: Collection[Choice]) -> Choice:

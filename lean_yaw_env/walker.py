@@ -178,6 +178,7 @@ class Walk(BaseWalk):
         """The walk on the web page, for a notebook, which shows what a cell's last line returns; ``height`` is in pixels."""
         from lean_yaw_env.viewer.notebook import PageDisplay  # few programs need it
 
+        require_count("height", height, 100, 10_000)
         return PageDisplay(json_text(self._saved()), height)
 
     def _saved(self) -> dict[str, Any]:

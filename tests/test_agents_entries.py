@@ -183,7 +183,7 @@ def test_results_of_other_episodes_do_not_enter(tmp_path: Path, change: dict, me
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--option", "noise=1"], "option 'noise' is unknown"),
+        (["--option", "noise=1"], "option must be one of parameters, "),
         (["--option", "sensor_noise"], "option must be as NAME=VALUE, got 'sensor_noise'"),
         (["--option", "slope=0", "--option", "slope=1"], "option 'slope' must be given once"),
         (["--option", "sensor_noise=-1"], "sensor_noise must be"),

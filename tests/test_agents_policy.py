@@ -142,7 +142,8 @@ def test_a_policy_file_that_holds_pickled_code_is_refused_and_not_run(folder, tm
 
 def test_another_environment_or_version_is_refused_with_what_to_do(folder):
     with pytest.raises(
-        agents.PolicyFileError, match="trained for LeanYaw/Heading-v0, not for LeanYaw/Walk-v0"
+        agents.PolicyFileError,
+        match="trained for the env_id 'LeanYaw/Heading-v0', not for 'LeanYaw/Walk-v0'",
     ):
         agents.load(folder, env_id="LeanYaw/Walk-v0")
     change(folder, env_id="LeanYaw/Heading-v99")
@@ -258,7 +259,7 @@ def test_agents_of_the_package_are_found_by_id_algorithm_and_seed(tmp_path, monk
     assert agents.load(ID, seed=11).card.seed == 11
     assert agents.load(ID, algorithm="sac").card.algorithm == "sac"
     for id_, choices, message in [
-        (ID, {"seed": 5}, "no ppo agent for LeanYaw/Heading-v0 with seed 5"),
+        (ID, {"seed": 5}, "no agent of the algorithm 'ppo' for LeanYaw/Heading-v0 with seed 5"),
         (ID, {"algorithm": "sac", "seed": 3}, "no sac agent for LeanYaw/Heading-v0 with seed 3"),
         (ID, {"algorithm": "../ppo"}, "algorithm must be a lower-case word"),
         ("LeanYaw/Walk-v0", {}, "no ppo agent for LeanYaw/Walk-v0"),
@@ -270,7 +271,9 @@ def test_agents_of_the_package_are_found_by_id_algorithm_and_seed(tmp_path, monk
 
 def test_a_folder_s_policy_of_another_algorithm_is_refused(folder):
     assert agents.load(folder, algorithm="ppo").card == card()
-    with pytest.raises(agents.PolicyFileError, match="trained by ppo, not by sac"):
+    with pytest.raises(
+        agents.PolicyFileError, match="trained by the algorithm 'ppo', not by 'sac'"
+    ):
         agents.load(folder, algorithm="sac")
 
 

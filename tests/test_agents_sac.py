@@ -149,7 +149,7 @@ def test_bad_settings_are_refused():
         ({"target_rate": 0.0}, "target_rate must be in"),
         ({"push_level": -1.0}, "push_level must be in"),
         ({"target_entropy": float("nan")}, "target_entropy must be in"),
-        ({"hidden": (0,)}, "hidden must name one layer"),
+        ({"hidden": (0,)}, "units of each layer in hidden must be from 1"),
     ]:
         with pytest.raises(ValueError, match=message):
             SACSettings(**values)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba import njit
 
 from lean_yaw_env import Walker
 from lean_yaw_env.kernel import compilation, fusing, notice
@@ -71,6 +72,26 @@ def test_kernels_give_the_same_steps_with_the_compiler_off(gait: Vector) -> None
         assert difference.max() < tolerance, name
     batch, single = np.array(compiled["batch"]), np.array(compiled["results"])[:, :5]
     assert (batch == single).all()
+
+
+def test_what_is_compiled_apart_says_so_when_it_cannot_be() -> None:
+    call = compilation.apart("lean_yaw_test_apart")
+
+    @compilation.compiled_apart("lean_yaw_test_apart", 4, 1, 9.0)
+    def halve(numbers, k):
+        if numbers[0] < 0.0:
+            raise ValueError("negative")
+        numbers[1 + k] = 0.5 * numbers[0]
+
+    @njit
+    def caller(numbers, k):
+        call(numbers, k)
+        return numbers[1 + k]
+
+    assert caller(np.array([3.0, 0.0, 0.0, 0.0]), 2) == 1.5
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "unraisablehook", lambda _: None)
+        assert caller(np.array([-3.0, 0.0, 0.0, 0.0]), 1) == 9.0
 
 
 @pytest.fixture

@@ -40,6 +40,7 @@ from lean_yaw_env.rendering.palette import (
     REFERENCE,
     RIGHT,
 )
+from lean_yaw_env.rendering.perspective import following_camera
 from lean_yaw_env.rendering.picture import footprint_figure
 from lean_yaw_env.walker import Walker
 
@@ -586,6 +587,27 @@ def test_a_film_moves_without_jumps_within_and_between_steps(walker, recorder, t
     centres = np.array([shape.centre for shape in shapes])
     # the centre of mass goes at 0.3 to 0.5
     assert np.linalg.norm(np.diff(centres, axis=0), axis=-1).max() < 0.012
+
+
+def test_the_camera_in_perspective_follows_a_turning_walker_without_jolts(
+    walker, recorder, tmp_path
+):
+    film(
+        walker, 12, tmp_path / "walk.gif", state=GAIT, mass_offset=0.03, progress=False,
+        fps=50, seconds_per_time_unit=1.0,
+    )  # fmt: skip
+    panel = Panel(0.0, 0.0, 300.0, 500.0)
+    cameras = [
+        following_camera(panel, scene, walker_shape(scene.parameters, scene.pose))
+        for scene in recorder.scenes
+    ]
+    turned = np.diff(np.unwrap([math.atan2(*camera.right[[0, 2]]) for camera in cameras]))
+    # The walker turns by 0.05 rad in a step of 0.7, and sways: the way behind it turns no faster than 0.3 rad in a unit of time
+    assert abs(turned).max() < 0.3 / 50
+    assert abs(turned.sum()) > 0.2
+    moved = np.linalg.norm(np.diff([camera.eye for camera in cameras], axis=0), axis=1)
+    # the centre of mass at up to 0.6, and the turn at a distance of three leg lengths
+    assert moved.max() < (0.6 + 3.0 * 0.3) / 50
 
 
 def test_a_film_s_scenes_are_the_walk_s(walker, recorder, tmp_path):

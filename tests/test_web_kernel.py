@@ -140,6 +140,24 @@ def test_steps_have_the_same_bits_whatever_their_end():
     assert_same_bits(run_module("walker_step", rows, size + 1, f"@{size}")[:, :size], expected)
 
 
+def test_a_landing_that_only_the_careful_way_finds_has_the_same_bits():
+    state = [
+        0.08701609192211816, 0.0011395946107252142, 0.03551927686193307, -1.0638458784542566, -0.598656327897991,
+    ]  # fmt: skip
+    body, near = WalkerParameters().body(), np.random.default_rng(8).uniform(-1e-6, 1e-6, (10, 5))
+    rows = np.array([[*body, 0.15, 0.0, 0.0, *(state + each), 1.0] for each in near])
+    expected = outcomes_of(rows)
+    assert (expected[:, Outcome._fields.index("status")] != records.FAILED).all()
+    size = expected.shape[1]
+    assert_same_bits(run_module("walker_step", rows, size + 1, f"@{size}")[:, :size], expected)
+    derived = np.empty((len(rows), 5 + len(OUTPUTS) * INPUTS + 1))
+    for i, (body, command, start, side) in enumerate(parts_of(rows)):
+        status, outputs, jacobian = step_jacobian(body, command, start, side, inputs=INPUTS)
+        derived[i] = [*outputs[:5], *jacobian.ravel(), status]
+    ours = run_module("walker_jacobian", rows, derived.shape[1], "@5", f"@{len(OUTPUTS) * INPUTS}")
+    assert_same_bits(ours, derived)
+
+
 def test_motion_within_a_step_has_the_same_bits():
     rows = walker_rows(500, seed=3)
     durations = outcomes_of(rows)[:, Outcome._fields.index("duration")]

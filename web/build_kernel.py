@@ -35,7 +35,13 @@ _NUMBA = {
     "NUMBA_SLP_VECTORIZE": "0",
 }
 _TRIPLE = "wasm32-unknown-unknown"
-_LLVM_TYPES = {"none": "void", "float64": "double", "int32": "i32", "float64*": "ptr"}
+_LLVM_TYPES = {
+    "none": "void",
+    "float64": "double",
+    "int32": "i32",
+    "int64": "i64",
+    "float64*": "ptr",
+}
 
 
 def sources() -> list[Path]:
@@ -111,7 +117,9 @@ def _for_wasm(code: str) -> str:
     return code
 
 
-def _exports(entries: dict[Any, Any], codes: list[tuple[str, str]]) -> str:
+def _exports(
+    entries: dict[Any, Any], codes: list[tuple[str, str]], forgetting: dict[Any, Any]
+) -> str:
     """Functions with plain arguments around Numba's, whose first two are where the result and an exception go."""
     lines = ["declare void @forget_blocks()"]
     for (function, signature), (_, name) in zip(entries.items(), codes, strict=True):
@@ -124,7 +132,7 @@ def _exports(entries: dict[Any, Any], codes: list[tuple[str, str]]) -> str:
             f"define {result} @{function.__name__}({named}) {{",
             f"  %result = alloca {place}",
             "  %exception = alloca ptr",
-            "  call void @forget_blocks()",
+            *(["  call void @forget_blocks()"] if function in forgetting else []),
             f'  %status = call i32 @"{name}"(ptr %result, ptr %exception, {named})',
         ]
         if result == "void":
@@ -135,21 +143,22 @@ def _exports(entries: dict[Any, Any], codes: list[tuple[str, str]]) -> str:
     return "\n".join(lines)
 
 
-def _object(entries: dict[Any, Any]) -> bytes:
-    """Machine code for WebAssembly of all entries."""
+def _object(exported: dict[Any, Any], apart: dict[Any, Any]) -> bytes:
+    """Machine code for WebAssembly of all entries, and of what they call by its name."""
     from llvmlite import binding
 
     binding.initialize_all_targets()
     binding.initialize_all_asmprinters()
     machine = binding.Target.from_triple(_TRIPLE).create_target_machine(opt=2, reloc="static")
     target = f'target datalayout = "{machine.target_data}"\ntarget triple = "{_TRIPLE}"\n'
+    entries = exported | apart
     codes = _intermediate_codes(entries)
-    module = binding.parse_assembly(target + _exports(entries, codes))
+    module = binding.parse_assembly(target + _exports(entries, codes, exported))
     for code, _ in codes:
         module.link_in(binding.parse_assembly(target + _for_wasm(code)))
-    exported = {function.__name__ for function in entries}
+    names = {function.__name__ for function in exported}
     for function in module.functions:
-        if not function.is_declaration and function.name not in exported:
+        if not function.is_declaration and function.name not in names:
             function.linkage = binding.Linkage.internal
     tuning = binding.create_pipeline_tuning_options(speed_level=2)
     tuning.loop_vectorization = tuning.slp_vectorization = tuning.loop_unrolling = False
@@ -177,11 +186,11 @@ def _linked(code: bytes, exported: list[str]) -> bytes:
 def build() -> bytes:
     """Compile the module."""
     os.environ.update(_NUMBA)
-    from kernel_entries import ENTRIES
+    from kernel_entries import APART, ENTRIES
 
     shared = ["shared_rows", "shared_size", "fused_multiply_add"]
     exported = [function.__name__ for function in ENTRIES] + shared
-    return _with_digest(_linked(_object(ENTRIES), exported), digest_of_sources())
+    return _with_digest(_linked(_object(ENTRIES, APART), exported), digest_of_sources())
 
 
 def layout() -> str:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numba import carray, njit, types
 
+from lean_yaw_env.kernel.blocks import block_of
 from lean_yaw_env.kernel.jacobian import OUTPUTS, step_jacobians
 from lean_yaw_env.kernel.passive import (
     INPUTS as PASSIVE_INPUTS,
@@ -25,7 +26,7 @@ from lean_yaw_env.kernel.passive import (
     passive_step as passive_walking_step,
 )
 from lean_yaw_env.kernel.records import STEPPED, Body, Command, Outcome, SectionState
-from lean_yaw_env.kernel.step import walking_step
+from lean_yaw_env.kernel.step import ACTIVE, walking_step
 from lean_yaw_env.kernel.trace import COLUMNS, trace
 
 STATE_SIZE = len(SectionState._fields)
@@ -190,6 +191,21 @@ def passive_walk(inputs, n, outcome):
     return n
 
 
+_STEPS, _DERIVATIVES = block_of(ACTIVE), block_of(ACTIVE, ACTIVE.inputs, ACTIVE.outputs)
+_STEPS_SIZE, _DERIVATIVES_SIZE = _STEPS.size, _DERIVATIVES.size
+_careful_step, _careful_derivatives = _STEPS.carefully, _DERIVATIVES.carefully
+
+
+def lean_yaw_careful_step(work, i):
+    """The step in lane ``i`` of a work array, for the kernel's own code."""
+    _careful_step(carray(work, _STEPS_SIZE), i)
+
+
+def lean_yaw_careful_step_derivatives(work, i):
+    """The same with derivatives."""
+    _careful_derivatives(carray(work, _DERIVATIVES_SIZE), i)
+
+
 _row, _count, _number = types.CPointer(types.float64), types.int32, types.float64
 
 ENTRIES = {
@@ -203,3 +219,9 @@ ENTRIES = {
     passive_walk: _count(_row, _count, _row),
 }
 """What the module exports, with its signatures."""
+
+APART = {
+    lean_yaw_careful_step: types.void(_row, types.int64),
+    lean_yaw_careful_step_derivatives: types.void(_row, types.int64),
+}
+"""What the kernel calls by its name (``compiled_apart``), with its signatures."""

@@ -39,7 +39,7 @@ double sqrt(double x) { return __builtin_sqrt(x); }
 // Numba's work arrays: a block holds what Numba looks for at the offsets of a 64-bit machine, and lives until the next call from outside.
 typedef struct { u64 owners, destructor, destructor_info, data, size; } Block;
 
-static _Alignas(64) unsigned char arena[1 << 17];
+static _Alignas(64) unsigned char arena[1 << 20];
 static unsigned used;
 
 void forget_blocks(void) { used = 0; }

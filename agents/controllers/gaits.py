@@ -129,14 +129,14 @@ class GaitNode(NamedTuple):
 
 
 def headings_of(parameters: WalkerParameters, pumping: Pumping) -> tuple[float, ...]:
-    """The headings of a family's gaits: those that the slope gives energy for, or all if it pumps uphill; one stands for all without a downhill."""
+    """The headings of a family's gaits: those that the slope gives energy for, or all if it pumps uphill. Without a downhill all headings are equal."""
     if not has_downhill(parameters):
         return (0.0, 0.0)
     return ALL_HEADINGS if pumping.uphill else DOWNHILL_HEADINGS
 
 
 class _GaitGrid:
-    """Follows gaits over a grid of inter-leg angles and headings."""
+    """Finds gaits over a grid of inter-leg angles and headings."""
 
     def __init__(self, parameters: WalkerParameters, pumping: Pumping) -> None:
         self._walker = Walker(replace(parameters, friction_limit=math.inf))
@@ -145,13 +145,15 @@ class _GaitGrid:
         self._headings = headings_of(parameters, pumping)
 
     def nodes(self, start: Vector) -> list[list[GaitNode]]:
-        """Gaits of the grid, each followed from its neighbour; where one is lost, its neighbour stands for all beyond it."""
+        """Gaits of the grid, each found from its neighbour. Where no gait is found, the last one found is repeated up to the grid's edge."""
         middle = int(np.argmin(np.abs(np.array(ANGLES) - INTER_LEG_ANGLE)))
         straight = self._solve(ANGLES[middle], 0.0, start, 0.0)
         shorter = self._chain(straight, [(angle, 0.0) for angle in ANGLES[middle - 1 :: -1]])
         longer = self._chain(straight, [(angle, 0.0) for angle in ANGLES[middle + 1 :]])
         straights = [*shorter[::-1], straight, *longer]
-        rows = {id(node): self._row(node) for node in straights}  # one that stands for others once
+        rows = {
+            id(node): self._row(node) for node in straights
+        }  # a repeated gait's row is computed once
         return [rows[id(node)] for node in straights]
 
     def _row(self, straight: GaitNode) -> list[GaitNode]:
@@ -165,7 +167,7 @@ class _GaitGrid:
         return [*right[::-1], straight, *left]
 
     def _chain(self, node: GaitNode, targets: Sequence[tuple[float, float]]) -> list[GaitNode]:
-        """Gaits at (inter-leg angle, heading) ever farther from a node; from a lost one on, the last that was found."""
+        """Gaits at targets (inter-leg angle, heading), each found from the one before. Where no gait is found, the last one found is repeated."""
         found: list[GaitNode] = []
         for angle, heading in targets:
             start = node.state.copy()

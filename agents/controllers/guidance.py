@@ -28,7 +28,7 @@ class PathSettings:
     ahead: float = 2.4
     """How far downhill the path's direction is taken: the walker answers that much late."""
     approach: float = 6.0
-    """Within which a small cross-track error is made good."""
+    """Distance within which a small cross-track error is corrected."""
     loop: LqrSettings = field(default_factory=LqrSettings)
 
     def __post_init__(self) -> None:

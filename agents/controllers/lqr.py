@@ -96,7 +96,7 @@ class LqrLoop:
         return as_actions(angle - INTER_LEG_ANGLE, side * (offset + change), self._options)
 
     def last_turn(self, seen: NDArray[np.float32]) -> Vector:
-        """How far the last step turned, as far as the state tells it; in the frame of the observation, rad, shape (...)."""
+        """How far the last step turned, as estimated from the state; in the frame of the observation, rad, shape (...)."""
         side = self.side(seen)
         state, offset = self._section_state(seen, side)
         gait = self.schedule.at(np.full(side.shape, self.settings.inter_leg_angle), state[..., 0])
@@ -139,7 +139,7 @@ def _deviation(gait: Scheduled, state: Vector, offset: Vector) -> Vector:
 
 
 class Regulator(MemorylessController):
-    """What the regulators of all tasks have in common: the inner loop, and one answer to each observation.
+    """The common part of all tasks' regulators: the inner loop, and actions from the observation alone.
 
     Parameters
     ----------

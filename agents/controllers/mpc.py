@@ -163,7 +163,7 @@ class MpcController:
                 centre = np.where(changes, base, centre)
                 mean = np.where(changes, 0.0, mean)
                 deviation = np.where(changes, 0.5 * spread, deviation)
-        # what looks little better need not be: the judgement ends somewhere, and foresees no pushes or too few
+        # a small advantage may be an error: the window is finite, and the plans see no pushes or too few
         return np.where((most > of_base + settings.margin)[:, None, None], best, base)
 
     def _narrowed(self, tried: Vector, worth: Vector, has_base: bool) -> tuple[Vector, Vector]:

@@ -31,9 +31,9 @@ class _Account:
 
 
 class Rollouts:
-    """Walks plans in rows of its own and tells their worth.
+    """Simulates plans on copies of the walkers and returns their worth.
 
-    A plan is judged by the reward within a window of time, as the task gives it. It sees the whole state of the episode: the true section
+    The worth of a plan is the task's reward within a window of time. The simulation has the whole state of the episode: the true section
     state, whatever noise the sensors have; the body; the command and when it runs out; the whole path. It does not see what has yet to be
     drawn. Without scenarios nobody pushes, and where the task draws something new, a command or a goal, a plan ends; with
     scenarios, numbers are drawn from keys of its own.

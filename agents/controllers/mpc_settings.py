@@ -44,7 +44,7 @@ class MpcSettings:
     """Best plans, of which the next are made."""
     spread: PlanSpread = field(default_factory=PlanSpread)
     window: float = 20.0
-    """Time in which plans are compared; one that ends earlier goes on at the reward rate of its last two steps."""
+    """Time in which plans are compared; one that ends earlier is extended at the reward rate of its last two steps."""
     fall: float = 50.0
     """Reward that a fall costs."""
     step_price: float = 0.0

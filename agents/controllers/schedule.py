@@ -110,7 +110,7 @@ def last_turn(before: LinearStep, weights: LqrWeights) -> Vector:
     """What (5,) times (state without heading, offset) best estimates how far the last step turned.
 
     Feedback is on the heading of the last footprint, tasks show the error of the mean of two. The last step's heading change follows
-    from what the step before started with, of which as much is left in the state as the map tells: the Gaussian estimate.
+    from the start of the step before. The map says how much of that start is left in the state now: this is the Gaussian estimate.
     """
     spread = np.array([*_PRIOR, 0.5 * weights.inter_leg_angle, weights.offset_change])
     ways = np.hstack([before.by_state[:, 1:], before.by_input]) * spread
@@ -167,7 +167,7 @@ class GainSchedule:
     def __init__(self, parameters: WalkerParameters, weights: LqrWeights, pumping: Pumping) -> None:
         self.has_downhill = has_downhill(parameters)
         self.angles = np.array(ANGLES)
-        # without a downhill one column stands for all, at either end of any range
+        # without a downhill all headings are equal: two equal columns at the ends of any range
         headings = headings_of(parameters, pumping) if self.has_downhill else (-1.0, 1.0)
         self.headings = np.array(headings)
         nodes = gait_nodes(parameters, pumping)

@@ -14,7 +14,7 @@ from lean_yaw_env.analysis.active_map import has_downhill
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions, gait_of
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import STATE_FIELDS, Vector
-from lean_yaw_env.validation import require_finite
+from lean_yaw_env.validation import LARGEST_SEED, require_count, require_finite, require_instance
 
 from ..agent import State
 from ..observations import ObservationLayout, require_observation
@@ -66,7 +66,7 @@ class RandomController(MemorylessController):
     """
 
     def __init__(self, seed: int = 0, layout: ObservationLayout | None = None) -> None:
-        self._generator = np.random.default_rng(seed)
+        self._generator = np.random.default_rng(require_count("seed", seed, 0, LARGEST_SEED))
         self._layout = layout
 
     def _actions(self, observation: Any) -> NDArray[np.float32]:
@@ -80,7 +80,7 @@ def _action_shape(
     if layout is not None:
         seen = layout.require(observation)
     elif isinstance(observation, Mapping):
-        seen = require_observation(observation["observation"])
+        seen = require_observation(observation.get("observation", observation))
     else:
         seen = require_observation(observation)
     return (*seen.shape[:-1], ACTION_SIZE)
@@ -122,6 +122,7 @@ class HeadingGains:
         for name, value in vars(self).items():
             if name != "pumping":
                 require_finite(name, value)
+        require_instance("pumping", self.pumping, Pumping)
 
 
 class HeadingFeedback(MemorylessController):
@@ -151,8 +152,10 @@ class HeadingFeedback(MemorylessController):
         gains: HeadingGains | None = None,
     ) -> None:
         self._options = EnvOptions() if options is None else options
+        require_instance("options", self._options, EnvOptions)
         self._layout = ObservationLayout.of(task, self._options, needs=(_ERROR,))
         self._gains = tuned("feedback", task, HeadingGains()) if gains is None else gains
+        require_instance("gains", self._gains, HeadingGains)
         parameters = self._options.walker_parameters(task_named(task))
         gait = gait_of(parameters, self._gains.pumping.downhill)
         self._gait_ankle, self._gait_ankle_rate = gait[_ANKLE], gait[_ANKLE_RATE]

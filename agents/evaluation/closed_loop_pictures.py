@@ -160,7 +160,7 @@ def save_pushes(reports: Sequence[ClosedLoopReport], path: Path) -> None:
 
 
 def _draw_pushes(axes: Any, pushes: LargestPushes, colour: Any, label: str | None) -> None:
-    """A closed line; a ring where nothing within reach fells the walker."""
+    """A closed line; a ring marks a direction in which no push within reach causes a fall."""
     angles = np.append(pushes.angles, pushes.angles[0])
     sizes = np.append(pushes.sizes, pushes.sizes[0])
     axes.plot(angles, sizes, color=colour, linewidth=1.8, marker=".", label=label)

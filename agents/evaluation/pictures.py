@@ -24,7 +24,7 @@ from .episodes import Row, direction, is_share
 from .recording import RecordedEpisode, record_episode
 
 PICTURED_STEPS = 120
-"""Steps of an episode that are drawn: two or three commands, at a scale at which footprints can be told apart."""
+"""Steps of an episode that are drawn: two or three commands, at a scale at which single footprints are visible."""
 _DPI = 110  # as sharp as a page shows it, and a small file
 _ARROW = 4.0  # leg lengths, of a commanded heading
 
@@ -130,7 +130,7 @@ def save_agents_footprints(
         ending = " (ended early)" if episode.terminated else ""
         episodes[name + (" (fell)" if episode.fall else ending)] = episode
     goals = [(goal.downhill, goal.right) for each in episodes.values() for goal in each.scene.goals]
-    # the same episode has the same body, whoever acts
+    # the same episode has the same body for every agent
     radius = next(iter(episodes.values())).scene.parameters.foot_radius
     figure, panels = footprint_figure(episodes, foot_radius=radius, places=goals)
     for panel, episode in zip(panels, episodes.values(), strict=True):

@@ -1,4 +1,4 @@
-"""Many agents' episodes at many tasks, shared out to processes and kept on disk, so that an interrupted evaluation goes on where it was."""
+"""Episodes of many agents at many tasks, run in several processes. Finished ones are kept on disk, so that an interrupted evaluation can continue."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from tqdm import tqdm
 import lean_yaw_env
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.files import written_whole
+from lean_yaw_env.reporting import uninterrupted
 from lean_yaw_env.validation import require_count
 
 from ..agent import Agent
@@ -80,7 +81,7 @@ class _Chunk:
     seeds: range
 
     def file(self, cache: Path) -> Path:
-        """Where it is kept: the name tells everything that its result depends on."""
+        """The file that keeps it. The file's name contains a digest of everything that the result depends on."""
         candidate = self.candidate
         depends = {
             "task": candidate.task,
@@ -120,6 +121,7 @@ class Evaluation:
 
     def __post_init__(self) -> None:
         require_count("processes", self.processes, 1, 1024)
+        require_count("costly_episodes", self.costly_episodes, 1, MOST_EPISODES)
 
     def candidates(self, tasks: Sequence[str], names: Sequence[str]) -> list[Candidate]:
         """Agents of the registry for tasks; all that there are for a task, in the registry's order, if none is named.
@@ -226,7 +228,8 @@ def _outcomes(
             yield chunk, _run_chunk(chunk, cache)
         return
     with _pool(min(processes, len(waiting))) as pool:
-        futures = {pool.submit(_run_chunk, chunk, cache): chunk for chunk in waiting}
+        with uninterrupted():
+            futures = {pool.submit(_run_chunk, chunk, cache): chunk for chunk in waiting}
         for future in as_completed(futures):
             yield futures[future], future.result()
 
@@ -310,6 +313,6 @@ def _policy_digest(entry: Path | None, folder: Path | None) -> str | None:
 def _digest(*files: Path) -> str:
     digest = hashlib.sha256()
     for path in files:
-        with contextlib.suppress(OSError):  # a policy's missing file is told when it is loaded
+        with contextlib.suppress(OSError):  # loading a policy reports its missing file
             digest.update(path.read_bytes())
     return digest.hexdigest()

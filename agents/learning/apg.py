@@ -29,7 +29,7 @@ from ..policies.policy_files import task_of
 from ..seeds import training_seed
 from .differentiable import DifferentiableWalkers, Steps, time_discounted_returns
 from .learner import LearnerSettings, captured, float_array, restore
-from .recorder import EndedEpisode, Recorder, State
+from .recorder import EndedEpisode, Recorder, State, require_like
 
 _LAST_LAYER = 0.01
 """Scale of a policy's last layer at first: it begins near the gait's own command."""
@@ -174,6 +174,7 @@ class GradientLearner:
 
     def restore(self, state: Any) -> None:
         """Bring the learner to a captured state."""
+        require_like(self.capture(), state)
         restore(self.networks, self.optimizers, state)
         self.walkers.restore(state["walkers"])
         self.steps = int(state["steps"])

@@ -72,7 +72,7 @@ class LearnerSettings:
         if not isinstance(self.hidden, tuple) or not self.hidden:
             raise ValueError(f"hidden must name one layer or more, got {self.hidden!r}")
         for units in self.hidden:
-            require_count("units of a hidden layer", units, 1, 2**16)
+            require_count("units of each layer in hidden", units, 1, 2**16)
 
     def require_counts(self, *names: str, low: int = 1) -> None:
         """``ValueError`` unless these settings are whole numbers from ``low`` on."""
@@ -151,6 +151,11 @@ def restore(
     for name, network in networks.items():
         network.load_state_dict({k: torch.from_numpy(v) for k, v in state[name].items()})
     for name, optimizer in optimizers.items():
+        parameters = [each for group in optimizer.param_groups for each in group["params"]]
+        for index, slots_of_one in state.get(name, {}).items():
+            for slot, value in slots_of_one.items():
+                if value.shape not in ((), parameters[int(index)].shape):
+                    raise ValueError(f"{name}/{index}/{slot} has the shape {value.shape}")
         slots = {
             int(index): {slot: torch.from_numpy(value) for slot, value in each.items()}
             for index, each in state.get(name, {}).items()  # nothing before the first update

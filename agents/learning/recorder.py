@@ -155,18 +155,23 @@ def _require_numbers(state: State) -> None:
             raise ValueError(f"{name} must hold finite numbers")
 
 
+def require_like(state: State, read: State) -> None:
+    """``ValueError`` unless a state that was read has the names, types and shapes of another; a replay buffer has as many rows as are filled."""
+    arrays = flattened(read)
+    for name, array in flattened(state).items():
+        if name not in arrays:
+            raise ValueError(f"it lacks {name}")
+        size = slice(1 if name.startswith("replay/") else 0, None)
+        kinds = [f"{each.dtype} of shape {each.shape[size]}" for each in (array, arrays[name])]
+        if kinds[0] != kinds[1]:
+            raise ValueError(f"{name} must be {kinds[0]}, got {kinds[1]}")
+
+
 def _require_equal(own: Arrays, read: Arrays) -> None:
     """``ValueError`` unless a learner has taken every array that was read as it is."""
     for name in sorted({*own, *read}):
-        if name not in own or name not in read:
-            raise ValueError(f"it {'lacks' if name in own else 'also holds'} {name}")
-        one, other = own[name], read[name]
-        if (one.dtype, one.shape) != (other.dtype, other.shape):
-            raise ValueError(
-                f"{name} must be {one.dtype} of shape {one.shape}, got {other.dtype} of shape {other.shape}"
-            )
-        if not np.array_equal(one, other):
-            raise ValueError(f"{name} holds impossible values")
+        if name not in own or name not in read or not np.array_equal(own[name], read[name]):
+            raise ValueError(f"{name} does not belong to it or holds impossible values")
 
 
 class Recorder:

@@ -23,7 +23,7 @@ from tqdm import tqdm
 from lean_yaw_env.errors import LeanYawError
 from lean_yaw_env.files import locked, read_json, write_json, write_text
 from lean_yaw_env.registration import ALL_ENV_IDS
-from lean_yaw_env.reporting import reporting
+from lean_yaw_env.reporting import reporting, uninterrupted
 from lean_yaw_env.validation import require_choice, require_count
 
 from ..evaluation.episodes import RETURN
@@ -254,7 +254,8 @@ def run_side_by_side(folders: Sequence[Path], jobs: int, *, progress: bool = Tru
                 process = context.Process(
                     target=_run_in_process, args=(folder, done[folder]), daemon=True
                 )
-                process.start()
+                with uninterrupted():
+                    process.start()
                 active[folder] = process
             ended = len(folders) - len(active) - len(waiting)
             bar.set_description(f"trainings done: {ended} of {len(folders)}", refresh=False)

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 import torch
+from gymnasium import spaces
 from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
@@ -22,7 +23,9 @@ from ..policies.policy import NORMALISATION_FLOOR, NORMALISED_LIMIT
 from ..policies.policy_files import task_of
 from ..seeds import training_seed
 from .learner import LearnerSettings, captured, float_array, restore
-from .recorder import EndedEpisode, Recorder, State
+from .recorder import EndedEpisode, Recorder, State, require_like
+
+_GENERATOR_WORDS = 624  # of the Mersenne Twister
 
 
 class TimedBuffer(Protocol):
@@ -76,7 +79,7 @@ class StableBaselinesLearner:
         threads: int,
         tensorboard: Path | None,
     ) -> None:
-        first = training_seed(seed)
+        self._first = training_seed(seed)
         self.options = options
         self._total, self._depth = settings.steps, len(settings.hidden)
         walking = vars(settings.training_options(options))
@@ -92,7 +95,10 @@ class StableBaselinesLearner:
             seed=seed,
             device="cpu",
         )
-        self._walkers.seed(first)  # in place of the policy's seed, which SB3 gives them too
+        self._walkers.seed(self._first)  # in place of the policy's seed, which SB3 gives them too
+        # what SB3 has from the first step on, so that a state has the same parts before it
+        self.model._last_obs = self.model._last_original_obs = self._no_observations()
+        self.model._last_episode_starts = np.ones(settings.walkers, dtype=np.bool_)
 
     def environment(self, env_id: str) -> str:
         """The task or the environment's id that the walkers train at."""
@@ -171,6 +177,11 @@ class StableBaselinesLearner:
     def restore(self, state: Any) -> None:
         """Bring the model to a captured state."""
         model = self.model
+        self._walkers.reset()
+        self._walkers.seed(
+            self._first
+        )  # a training that is resumed before its first step resets them again
+        require_like(self.capture(), state)
         restore({"policy": model.policy}, self.optimizers, state)
         for name, moments in self._moments().items():
             moments.mean, moments.var = state[name]["mean"], state[name]["var"]
@@ -183,8 +194,18 @@ class StableBaselinesLearner:
         model._last_obs, model._last_episode_starts = (
             state["last"][k] for k in ("observations", "starts")
         )
+        if not 0 <= int(state["numpy"]["state"]["pos"]) <= _GENERATOR_WORDS:
+            raise ValueError("numpy/state/pos must be a place in the generator's state")
         torch.set_rng_state(torch.from_numpy(state["torch"]))
         np.random.set_state({"bit_generator": "MT19937", **state["numpy"]})  # noqa: NPY002
+
+    def _no_observations(self) -> Any:
+        space, n = self._walkers.observation_space, self._walkers.num_envs
+        if isinstance(space, spaces.Dict):
+            return {
+                key: np.zeros((n, *(each.shape or ())), each.dtype) for key, each in space.items()
+            }
+        return np.zeros((n, *(space.shape or ())), space.dtype)
 
     def _moments(self) -> dict[str, Any]:
         found: dict[str, Any] = {"returns": self._normaliser.ret_rms}

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env import __version__
 from lean_yaw_env.envs.options import ACTION_SIZE, EnvOptions
-from lean_yaw_env.validation import require_choice
+from lean_yaw_env.validation import require_choice, require_flag
 
 from ..agent import State
 from ..observations import ObservationLayout
@@ -131,6 +131,7 @@ class Policy:
         deterministic: bool = True,
     ) -> tuple[NDArray[np.float32], State]:
         """The network's actions; see ``Agent.predict``. It remembers nothing."""
+        require_flag("deterministic", deterministic)
         signal = before = self._normalised(self.card.layout.require(observation))
         activate = ACTIVATIONS[self.card.activation]
         for k in range(self.depth):

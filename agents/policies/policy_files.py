@@ -9,9 +9,10 @@ from typing import Any
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.extras import needs_extra
-from lean_yaw_env.files import read_json, read_regular, write_json, written_whole
+from lean_yaw_env.files import read_json, read_regular, require_path, write_json, written_whole
 from lean_yaw_env.parameters import WalkerParameters
-from lean_yaw_env.registration import ALL_ENV_IDS, NAMESPACE, TASK_IDS
+from lean_yaw_env.registration import ALL_ENV_IDS, GOAL_ENV_ID, NAMESPACE, TASK_IDS
+from lean_yaw_env.validation import require_instance, require_seed, require_text
 
 from ..observations import ObservationLayout
 from .policy import Policy, PolicyCard, require_algorithm
@@ -53,8 +54,9 @@ class PolicyFileError(ValueError):
 
 def save(policy: Policy, folder: Path) -> None:
     """Write a policy into a folder, which is made if it is not there; each file whole, the weights first."""
+    card = require_instance("policy", policy, Policy).card
+    folder = require_path(folder, "folder")
     folder.mkdir(parents=True, exist_ok=True)
-    card = policy.card
     data = _safetensors().numpy.save(policy.weights)
     with written_whole(folder / WEIGHTS_FILE) as temporary:
         temporary.write_bytes(data)
@@ -83,7 +85,7 @@ def load(
     ----------
     source : an environment's id, for the agent that comes with the package, or a folder
     env_id : the environment that the policy is wanted for; any by default
-    algorithm : that trained the policy; by default PPO for the package's agents, and any for a folder
+    algorithm : that trained the policy; by default PPO for the package's agents (HER for WaypointGoal), and any for a folder
     seed : of the package's agent for that id and algorithm; the lowest one by default
 
     Raises
@@ -94,10 +96,16 @@ def load(
     gymnasium.error.DependencyNotInstalled
         If safetensors is not installed.
     """
-    name = str(source)
+    name = str(require_path(source, "source"))
+    seed = require_seed("seed", seed)
+    for argument, value in (("env_id", env_id), ("algorithm", algorithm)):
+        if value is not None:
+            require_text(argument, value)
     if name.startswith(f"{NAMESPACE}/"):
         require_env_id(name)
-        folder = shipped_folder(name, algorithm or DEFAULT_ALGORITHM, seed)
+        folder = shipped_folder(
+            name, algorithm or ("her" if name == GOAL_ENV_ID else DEFAULT_ALGORITHM), seed
+        )
         env_id = name if env_id is None else env_id
     else:
         folder = Path(source)
@@ -105,10 +113,12 @@ def load(
         card, digest = _read_card(folder / CARD_FILE)
         if env_id is not None and card.env_id != env_id:
             raise ValueError(
-                f"the policy was trained for {card.env_id}, not for {env_id}; train one for it by train.py"
+                f"the policy was trained for the env_id {card.env_id!r}, not for {env_id!r}; train one for it by train.py"
             )
         if algorithm is not None and card.algorithm != algorithm:
-            raise ValueError(f"the policy was trained by {card.algorithm}, not by {algorithm}")
+            raise ValueError(
+                f"the policy was trained by the algorithm {card.algorithm!r}, not by {algorithm!r}"
+            )
         return Policy(card, _read_weights(folder / WEIGHTS_FILE, digest))
     except PolicyFileError:
         raise
@@ -118,6 +128,8 @@ def load(
 
 def shipped_seeds(env_id: str, algorithm: str = DEFAULT_ALGORITHM) -> list[int]:
     """The seeds, in order, of the agents that come with the package for an environment's id and an algorithm; empty for none."""
+    require_text("env_id", env_id)
+    require_text("algorithm", algorithm)
     folders = shipping_folder(env_id, algorithm, 0).parent.glob("seed*")
     names = [folder.name.removeprefix("seed") for folder in folders]
     return sorted(int(name) for name in names if name.isdecimal())
@@ -132,7 +144,7 @@ def shipped_folder(
             return shipping_folder(env_id, algorithm, each)
     wanted = "" if seed is None else f" with seed {seed}"
     raise PolicyFileError(
-        f"no {algorithm} agent for {env_id}{wanted} comes with this package; train one by train.py"
+        f"no agent of the algorithm {algorithm!r} for {env_id}{wanted} comes with this package; train one by train.py"
     )
 
 

@@ -8,7 +8,7 @@ import os
 import platform
 import sqlite3
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import optuna
 from optuna.trial import FrozenTrial, TrialState
+from sqlalchemy.exc import SQLAlchemyError
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.errors import LeanYawError
@@ -115,8 +116,33 @@ def tune(
     ------
     ValueError
         If the file holds the study of another tuning, or is none.
+    OSError
+        If the file cannot be written.
     """
     require_count("trials", trials, 1, 10**6)
+    with _stored(storage):
+        return _tune(tuning, trials, storage, out, progress, shown)
+
+
+@contextlib.contextmanager
+def _stored(storage: Path | None) -> Iterator[None]:
+    """Report that a study's file cannot be read or written as ``OSError``."""
+    try:
+        yield
+    except (SQLAlchemyError, optuna.exceptions.StorageInternalError) as error:
+        cause = error.__cause__ or error
+        reason = str(getattr(cause, "orig", cause)).splitlines()[0]
+        raise OSError(f"the study in {str(storage)!r} cannot be kept: {reason}") from error
+
+
+def _tune(
+    tuning: Tuning,
+    trials: int,
+    storage: Path | None,
+    out: Path | None,
+    progress: bool,
+    shown: Callable[[str], object],
+) -> optuna.Study:
     space = tuning.space()
     study = _study(tuning, space, storage)
 
@@ -155,7 +181,7 @@ def result_words(trial: FrozenTrial | None) -> str:
 
 def _study(tuning: Tuning, space: Space, storage: Path | None) -> optuna.Study:
     """The file's study, a new one where there is none."""
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
     name = f"{tuning.agent} {tuning.task}"
     if storage is not None:
         storage.parent.mkdir(parents=True, exist_ok=True)

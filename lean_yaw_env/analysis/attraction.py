@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,6 @@ from lean_yaw_env.analysis.section_map import (
 from lean_yaw_env.analysis.storage import Growing, require_axis
 from lean_yaw_env.parameters import QUARTER_TURN, Vector
 from lean_yaw_env.validation import (
-    require_array,
     require_choice,
     require_count,
     require_flag,
@@ -89,10 +88,8 @@ def basin(
     require_count("n_steps", n_steps, 1, 1_000_000)
     require_flag("progress", progress)
     section_map = section_map_of(walker, **command)
-    if centre is not None:
-        section_map.require_state(require_array("centre", centre, (len(section_map.names),)))
     cycle = find_limit_cycle(section_map) if centre is None else None
-    middle = cycle.state if cycle is not None else section_map.require_state(np.asarray(centre))
+    middle = require_centre(section_map, centre) if cycle is None else cycle.state
     x, y = (require_pair(*axis, "coordinate, values") for axis in (("x", x), ("y", y)))
     if x[0] == y[0]:
         raise ValueError(f"x and y must be different coordinates, got {x[0]!r} twice")
@@ -119,6 +116,14 @@ def basin(
                 apart = np.abs(walks.states - on_foot)[:, section_map.free]
                 result["distance"][some] = apart.max(axis=1)
     return growing.dataset()
+
+
+def require_centre(section_map: SectionMap, centre: Any) -> Vector:
+    """Return a state of a map as its ``require_state`` does; the message calls it ``centre``."""
+    try:
+        return section_map.require_state(centre)
+    except ValueError as error:
+        raise ValueError(f"centre: {error}") from error
 
 
 def section_grid(

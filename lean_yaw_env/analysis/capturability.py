@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lean_yaw_env.analysis.active_map import ActiveMap
-from lean_yaw_env.analysis.attraction import section_grid
+from lean_yaw_env.analysis.attraction import require_centre, section_grid
 from lean_yaw_env.analysis.limit_cycle import find_limit_cycle
 from lean_yaw_env.analysis.many_walks import walk_many
 from lean_yaw_env.analysis.section_map import (
@@ -32,7 +32,14 @@ from lean_yaw_env.errors import SolverError
 from lean_yaw_env.kernel.records import FAILED, STEPPED
 from lean_yaw_env.parameters import Vector, require_inter_leg_angle, require_mass_offset
 from lean_yaw_env.threads import share_out
-from lean_yaw_env.validation import require_count, require_number, require_shape, require_vector
+from lean_yaw_env.validation import (
+    require_count,
+    require_instance,
+    require_mapping,
+    require_number,
+    require_shape,
+    require_vector,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -170,11 +177,13 @@ def capture(
     require_count("settle_steps", settle_steps, 1, 1_000_000)
     require_count("threads", threads, 1, 1024)
     states = require_shape("states", states, (None, len(section_map.names)))
-    if known is not None and known.plans.shape != (len(states), most_steps, 2):
-        raise ValueError("known must be of the same states and most_steps")
+    require_instance("choices", choices, Choices)
+    size = (len(states), most_steps, 2)
+    if known is not None and require_instance("known", known, Capture).plans.shape != size:
+        raise ValueError(f"known must be of the same states and most_steps, got {known!r}")
     search = _Search(section_map, choices, choices.commands, settle_steps)
     least = np.full(len(states), most_steps + 1)
-    plans = np.full((len(states), most_steps, 2), np.nan)
+    plans = np.full(size, np.nan)
     if known is not None:
         least[:], plans[:] = known.least_steps, known.plans
     carried = np.full(len(states), section_map.carried)
@@ -288,6 +297,7 @@ def refine_capture(
     require_number("tolerance", tolerance, 0.0, 1.0)
     require_count("most_levels", most_levels, 1, 6)
     levels: list[tuple[Choices, Capture]] = []
+    require_instance("choices", choices, Choices)
     known = None
     for _ in range(most_levels):
         found = capture(
@@ -342,11 +352,16 @@ def capture_map(
         If the integrator fails.
     """
     section_map = section_map_of(walker, **command)
-    if not axes:
-        raise ValueError("axes must name one or more coordinates, got none")
-    middle = (
-        find_limit_cycle(section_map).state if centre is None else section_map.require_state(centre)
-    )
+    require_instance("choices", choices, Choices)
+    require_count("most_steps", most_steps, 0, MOST_STEPS)
+    require_count("settle_steps", settle_steps, 1, 1_000_000)
+    require_count("threads", threads, 1, 1024)
+    if not require_mapping("axes", axes):
+        raise ValueError(f"axes must name one or more coordinates, got {axes!r}")
+    if centre is None:
+        middle = find_limit_cycle(section_map).state
+    else:
+        middle = require_centre(section_map, centre)
     checked, states = section_grid(section_map, axes, middle)
     result = {name: np.full(len(states), np.nan) for name in ("inter_leg_angle", "mass_offset")}
     result["least_steps"] = np.full(len(states), -1.0)

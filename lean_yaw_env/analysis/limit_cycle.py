@@ -143,6 +143,7 @@ class LimitCycle:
         """
         if not isinstance(self.section_map, ActiveMap):
             raise ValueError(f"only a Walker's gait can be shown, got one of {self.section_map}")
+        require_count("n_steps", n_steps, 1, 100_000)
         commands = [self.steps[k % len(self.steps)].command for k in range(n_steps)]
         walk = self.section_map.walker.walk(
             n_steps,

@@ -190,19 +190,12 @@ def bicycle(
 
 
 def changed(value: Any, changes: Any, place: str) -> Any:
-    """A dataclass with some fields changed, those that are dataclasses themselves in the same way.
-
-    Parameters
-    ----------
-    value : dataclass
-    changes : mapping of names to values
-    place : str
-        Where the changes are from, for the error.
+    """A dataclass with some fields changed, those that are dataclasses themselves in the same way; ``place`` is where the changes are from.
 
     Raises
     ------
     ValueError
-        If ``changes`` is no mapping or a field has another name; from the dataclass, if a value is outside its range.
+        If ``changes`` is no mapping or has a name that is no field; from the dataclass, if a value is outside its range.
     """
     if not isinstance(changes, dict):
         raise ValueError(f"{place} must be an object of names and values, got {changes!r}")
@@ -294,7 +287,7 @@ def view(
         typer.echo(f"the page is at {server.address} until Ctrl-C")
         try:
             server.wait()
-        except KeyboardInterrupt:
+        finally:
             server.close()
 
     return Output({"address": server.address}, serve)

@@ -12,7 +12,7 @@ from lean_yaw_env.envs.pictures import FRAMES_PER_SECOND
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.rendering.filming import HOLD_SECONDS
 from lean_yaw_env.rendering.motion import SECONDS_PER_TIME_UNIT
-from lean_yaw_env.validation import require_count, require_number
+from lean_yaw_env.validation import require_count, require_instance, require_number
 
 
 class RealTime(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):
@@ -39,7 +39,7 @@ class RealTime(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs)
         self, env: gym.Env[Any, Any], fps: int = FRAMES_PER_SECOND, speed: float = 1.0
     ) -> None:
         gym.utils.RecordConstructorArgs.__init__(self, fps=fps, speed=speed)
-        super().__init__(env)
+        super().__init__(require_instance("env", env, gym.Env))
         if not isinstance(env.unwrapped, WalkerEnv) or env.render_mode != "rgb_array":
             raise ValueError(
                 f'env must be an environment of lean_yaw_env with render_mode="rgb_array", got {env} '

@@ -18,7 +18,7 @@ from lean_yaw_env.envs.snapshots import PickledWithState, State, restore, state_
 from lean_yaw_env.envs.tasks import Task, task_named
 from lean_yaw_env.rendering.filming import Frame
 from lean_yaw_env.rendering.pygame_renderer import Renderer
-from lean_yaw_env.validation import require_choice, require_seed
+from lean_yaw_env.validation import require_choice, require_number, require_seed
 
 _KEYS = {
     key: np.array(action, dtype=np.float32)
@@ -187,6 +187,7 @@ class WalkerEnv(PickledWithState, gym.Env[NDArray[np.float32], NDArray[np.float3
         ResetNeeded
             Before the first episode, and without a ``render_mode``.
         """
+        require_number("share", share, 0.0, 1.0)
         if self._gallery is None or not self._has_begun:
             raise ResetNeeded("call reset() before render()")
         return self._gallery.frame(share=share)

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from lean_yaw_env.kernel.compilation import inlined
+from lean_yaw_env.kernel.compilation import apart, called, inlined
 from lean_yaw_env.kernel.lanes import LANES, ROW, lane_reader, lane_writer, padded
 from lean_yaw_env.kernel.records import FAILED, FLYING, WITHOUT_DERIVATIVE, Body
 
@@ -37,6 +38,7 @@ class Model:
     advance : ``advance(stance, flight)`` returns the flight an integrator step later
     finish : ``finish(stance, flight)`` returns the outcome of a flight that has ended
     carefully : ``carefully(body, command, state, side)`` returns the outcome of a step that has come out as ``FAILED``, found another way
+    name : of what is compiled apart for this model
     """
 
     command: type[Any]
@@ -50,19 +52,36 @@ class Model:
     advance: Callable[..., Any]
     finish: Callable[..., Any]
     carefully: Callable[..., Any]
+    name: str
 
 
-class _Block(NamedTuple):
-    """Where a block's rows are, and the formula that walks its lanes."""
+class Block(NamedTuple):
+    """Where a block's rows are, and formulas for its lanes.
+
+    Attributes
+    ----------
+    who, outcome, derivatives : first places of these rows
+    size : of the work array
+    ended : first place of the outcomes' status
+    name : under which the careful steps are compiled apart
+    walk : walks the lanes
+    carefully : ``carefully(work, i)`` finds the outcome of lane ``i`` carefully
+    walk_carefully : ``walk_carefully(body, command, state, side)`` returns the outcome of one step, through a lane
+    """
 
     who: int
     outcome: int
     derivatives: int
     size: int
+    ended: int
+    name: str
     walk: Any
+    carefully: Any
+    walk_carefully: Any
 
 
-def _block(model: Model, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> _Block:
+@lru_cache
+def block_of(model: Model, inputs: tuple[str, ...] = (), outputs: tuple[str, ...] = ()) -> Block:
     """A block whose lanes carry derivatives by ``inputs`` of ``outputs``, if there are any."""
 
     def rows(record: type[Any]) -> int:
@@ -105,7 +124,29 @@ def _block(model: Model, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> _
         outcome + model.outcome._fields.index("status") * ROW,
     )  # fmt: skip
     size = max(seeds + len(inputs) * ROW, derivatives + len(outputs) * ROW)
-    return _Block(who, outcome, derivatives, size, _walk(model, places, formulas, len(inputs)))
+    name = model.name + ("_derivatives" if inputs else "")
+    walk, carefully = _walk(model, places, formulas, len(inputs), name)
+
+    write_state, write_command = (
+        lane_writer(model.state, state),
+        lane_writer(model.command, command),
+    )
+    write_body, read_outcome = lane_writer(Body, body), lane_reader(model.outcome, outcome)
+    called_apart = apart(name)
+
+    @called
+    def walk_carefully(a_body, a_command, a_state, a_side):
+        work = np.zeros(size)
+        write_body(work, 0, a_body)
+        write_command(work, 0, a_command)
+        write_state(work, 0, a_state)
+        work[side] = a_side
+        called_apart(work, 0)
+        return read_outcome(work, 0)
+
+    return Block(
+        who, outcome, derivatives, size, places.ended, name, walk, carefully, walk_carefully
+    )
 
 
 class _Formulas(NamedTuple):
@@ -134,7 +175,7 @@ class _Places(NamedTuple):
     ended: int  # the outcome's status
 
 
-def _walk(model: Model, places: _Places, formulas: _Formulas, inputs: int) -> Any:
+def _walk(model: Model, places: _Places, formulas: _Formulas, inputs: int, name: str) -> Any:
     """``walk(work, first, n, columns, bodies, commands, states, sides)``: follow ``n`` lanes to their outcomes.
 
     Lane ``first`` + i is that of walker (``first`` + i) // ``columns``, differentiated by the input of number (``first`` + i) % ``columns``.
@@ -147,6 +188,7 @@ def _walk(model: Model, places: _Places, formulas: _Formulas, inputs: int) -> An
         len(record._fields) for record in (model.state, model.command, Body)
     )
     swapped = who // ROW + 1  # rows that a lane in flight needs
+    called_apart = apart(name)
 
     @inlined
     def enter(work, i, lane, columns, bodies, commands, states, sides):
@@ -203,12 +245,16 @@ def _walk(model: Model, places: _Places, formulas: _Formulas, inputs: int) -> An
         for i in range(n):
             if work[ended + i] == FAILED:
                 enter(work, i, int(work[who + i]), columns, bodies, commands, states, sides)
-                found = carefully(
-                    read_body(work, i), read_command(work, i), read_state(work, i), work[side + i]
-                )
-                write_outcome(work, i, found)
+                called_apart(work, i)
 
-    return walk
+    @inlined
+    def walk_carefully(work, i):
+        found = carefully(
+            read_body(work, i), read_command(work, i), read_state(work, i), work[side + i]
+        )
+        write_outcome(work, i, found)
+
+    return walk, walk_carefully
 
 
 def steps_of(model: Model) -> Any:
@@ -216,7 +262,8 @@ def steps_of(model: Model) -> Any:
 
     Rows of ``bodies`` (1 or n, 11), ``commands``, ``states`` and ``outcomes`` (n, .) are the model's records; ``sides`` (n,).
     """
-    who, outcome, _, size, walk = _block(model, (), ())
+    block = block_of(model)
+    who, outcome, size, walk = block.who, block.outcome, block.size, block.walk
     fields = len(model.outcome._fields)
 
     @inlined
@@ -240,7 +287,8 @@ def derivatives_of(model: Model) -> Any:
     the first of the model's outputs in ``outputs`` (n, .), and the derivatives of the first k of them by the first m inputs in
     ``jacobians`` (n, k, m).
     """
-    who, outcome, derivatives, size, walk = _block(model, model.inputs, model.outputs)
+    block = block_of(model, model.inputs, model.outputs)
+    who, outcome, derivatives, size, walk = *block[:4], block.walk
     fields = model.outcome._fields
     status = outcome + fields.index("status") * ROW
     values = tuple(outcome + fields.index(name) * ROW for name in model.outputs)

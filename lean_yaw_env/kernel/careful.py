@@ -11,7 +11,7 @@ the exact one's to 1e-10. The fast way judges a dip within an integrator step by
 
 from __future__ import annotations
 
-from lean_yaw_env.kernel.compilation import apart
+from lean_yaw_env.kernel.compilation import called
 from lean_yaw_env.kernel.elementary import quotient
 from lean_yaw_env.kernel.flight import (
     controlled_lengths,
@@ -20,6 +20,7 @@ from lean_yaw_env.kernel.flight import (
     taken,
     trial,
 )
+from lean_yaw_env.kernel.lanes import replacer
 from lean_yaw_env.kernel.records import FLYING, LANDED, LANDING, Flight
 
 LONGEST_STEP = 0.03
@@ -29,13 +30,17 @@ MOST_ATTEMPTS = 50_000.0
 _HALVINGS = 60
 _NONE_IN_SIGHT = 1e9
 
+_late = replacer(
+    Flight, "time", "pitch", "twist", "pitch_rate", "twist_rate", "damping_loss", "status"
+)
 
-@apart
+
+@called
 def _tried(stance, flight, h):
     return trial(stance, flight, h)
 
 
-@apart
+@called
 def lowest_point(stance, flight, h):
     """When within a step the gap, which falls at its start and rises at its end, is least."""
     falls, rises = 0.0, h
@@ -48,7 +53,7 @@ def lowest_point(stance, flight, h):
     return rises
 
 
-@apart
+@called
 def touch_time(stance, flight, h):
     """When within a step that begins above the floor and ends on or below it the foot touches down."""
     above, below = 0.0, h
@@ -61,7 +66,7 @@ def touch_time(stance, flight, h):
     return below
 
 
-@apart
+@called
 def advance_carefully(stance, flight):
     """Try one short integrator step; where the foot touches down within it, go no further."""
     h = min(flight.next_step, LONGEST_STEP)
@@ -79,7 +84,7 @@ def advance_carefully(stance, flight):
     return taken(stance, flight, tried, True, True, 0.0, MOST_ATTEMPTS)
 
 
-@apart
+@called
 def fly_carefully(stance, flight):
     """Follow a flight to its end; one that lands is on the floor, with nothing left to correct."""
     while flight.status == FLYING:
@@ -87,27 +92,13 @@ def fly_carefully(stance, flight):
     # the landing time's derivative, which moves no real part
     rate = flight.gap_rate
     late = quotient(flight.gap.real - flight.gap, rate if rate.real != 0.0 else 1.0 + 0.0 * rate)
-    return Flight(
+    return _late(
+        flight,
         flight.time + late,
         flight.pitch + late * flight.pitch_rate,
         flight.twist + late * flight.twist_rate,
         flight.pitch_rate + late * flight.pitch_acceleration,
         flight.twist_rate + late * flight.twist_acceleration,
-        flight.pitch_acceleration,
-        flight.twist_acceleration,
-        flight.gap,
-        flight.gap_rate,
-        flight.gap_acceleration,
-        flight.next_step,
-        flight.normal_force,
-        flight.tangential_squared,
-        flight.least_normal_force,
-        flight.friction_squared,
         flight.damping_loss + late * stance.ankle_damping * flight.twist_rate * flight.twist_rate,
-        flight.evaluations,
-        flight.attempts,
         LANDED if flight.status == LANDING else flight.status,
-        flight.start_pitch,
-        flight.start_twist,
-        flight.start_kinetic,
     )

@@ -8,18 +8,22 @@ Both keep IEEE semantics (no fast-math), so that every kernel that inlines the s
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import linecache
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from types import FunctionType, ModuleType
+from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
+from llvmlite.binding import add_symbol
 from numba import config, njit, typeof
-from numba.core import cgutils
+from numba.core import cgutils, types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.extending import intrinsic, overload
 
 from lean_yaw_env.kernel import fusing
@@ -33,11 +37,77 @@ _njit: Any = njit
 _config: Any = config
 _overload: Any = overload
 
-inlined = _njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
+
+class _FormulaLibrary(JITCodeLibrary):
+    """A formula's intermediate code. Its callers link it into their own, so that machine code of its own would be made in vain."""
+
+    codegen: Any = SimpleNamespace(set_env=lambda name, environment: None)
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """No address: Python does not call it."""
+        return 0
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
 
 
-apart = _njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
-"""Mark a formula that is called and not inlined: for what is needed too rarely to be worth a copy in each kernel."""
+class _FormulaCompiler(Compiler):
+    """Numba's compiler for formulas."""
+
+    def define_pipelines(self) -> Any:
+        """Its passes; before them, the library that their result goes to."""
+        codegen = self.state.targetctx.codegen()
+        self.state.library = _FormulaLibrary(codegen, self.state.func_id.func_qualname)
+        return super().define_pipelines()
+
+
+_FORMULA: dict[str, Any] = {"pipeline_class": _FormulaCompiler, **_OPTIONS}
+
+inlined = _njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_FORMULA)
+
+
+called = _njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_FORMULA)
+"""Mark a formula that is called and not inlined, as it is needed too rarely to be worth a copy."""
+
+
+def apart(name: str) -> Any:
+    """A formula ``call(numbers, k)`` of flat ``numbers`` that calls what ``compiled_apart`` defines of this name."""
+    if _config.DISABLE_JIT:
+        return lambda numbers, k: _APART[name](numbers, k)
+    symbol = types.ExternalFunction(name, types.void(types.CPointer(types.float64), types.intp))
+    return inlined(lambda numbers, k: symbol(numbers.ctypes, k))
+
+
+def compiled_apart(
+    name: str, size: int, place: int, otherwise: float
+) -> Callable[[Callable[..., Any]], Any]:
+    """Decorate an entry point ``function(numbers, k)`` of ``size`` flat numbers that other compiled code calls by its name.
+
+    It is for what is needed too rarely to be worth a copy in each of its callers: it is compiled once, and when it is first called. If
+    that is interrupted or fails, the error is printed and ``numbers[place + k]`` is ``otherwise``.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        entry = entry_point()(function)
+
+        @ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_double), ctypes.c_ssize_t)
+        def call(numbers: Any, k: int) -> None:
+            array = np.ctypeslib.as_array(numbers, (size,))
+            try:
+                entry(array, k)
+            except BaseException:  # compiled code cannot take an exception; ctypes prints it
+                array[place + k] = otherwise
+                raise
+
+        _APART[name] = entry if _config.DISABLE_JIT else call
+        if not _config.DISABLE_JIT:
+            add_symbol(name, ctypes.cast(call, ctypes.c_void_p).value)
+        return entry
+
+    return decorate
+
+
+_APART: dict[str, Any] = {}
 
 
 def fused(function: Any) -> Any:
@@ -100,7 +170,7 @@ _without_owner: Any = intrinsic(_without_owner_code)
 
 def by_type(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
     """Decorate what chooses, by the arguments' types, the formula that is compiled in a function's place."""
-    return _overload(function, jit_options={"forceinline": True, **_OPTIONS}, **options)
+    return _overload(function, jit_options={"forceinline": True, **_FORMULA}, **options)
 
 
 @by_type(borrowed)

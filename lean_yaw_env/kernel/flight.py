@@ -15,6 +15,7 @@ from lean_yaw_env.kernel import verner
 from lean_yaw_env.kernel.compilation import fused
 from lean_yaw_env.kernel.contact import worst_contact
 from lean_yaw_env.kernel.elementary import sine_cosine
+from lean_yaw_env.kernel.lanes import chooser, replacer
 from lean_yaw_env.kernel.records import (
     BACKWARD,
     FAILED,
@@ -224,12 +225,16 @@ class Trial(NamedTuple):
     gap_rate: float
     gap_acceleration: float
     error: float  # in tolerances
-    damping_loss: float
+    loss: float  # in the ankle's damper
     normal_force: float
     tangential_squared: float
     least_normal_force: float
     friction_squared: float
     collapses: bool
+
+
+_reached = chooser(Flight, Trial)
+_onward = replacer(Flight, "next_step", "damping_loss", "evaluations", "attempts", "status")
 
 
 @fused
@@ -288,30 +293,10 @@ def taken(stance, flight, tried, accepted, landed, next_step, most_attempts):
         status = SLIP if tried.friction_squared > stance.friction_limit_squared.real else status
         status = LIFT_OFF if tried.least_normal_force <= 0.0 else status
 
-    return Flight(
-        tried.time if accepted else flight.time,
-        tried.pitch if accepted else flight.pitch,
-        tried.twist if accepted else flight.twist,
-        tried.pitch_rate if accepted else flight.pitch_rate,
-        tried.twist_rate if accepted else flight.twist_rate,
-        tried.pitch_acceleration if accepted else flight.pitch_acceleration,
-        tried.twist_acceleration if accepted else flight.twist_acceleration,
-        tried.gap if accepted else flight.gap,
-        tried.gap_rate if accepted else flight.gap_rate,
-        tried.gap_acceleration if accepted else flight.gap_acceleration,
-        next_step,
-        tried.normal_force if accepted else flight.normal_force,
-        tried.tangential_squared if accepted else flight.tangential_squared,
-        tried.least_normal_force if accepted else flight.least_normal_force,
-        tried.friction_squared if accepted else flight.friction_squared,
-        flight.damping_loss + tried.damping_loss if accepted else flight.damping_loss,
-        flight.evaluations + 13.0,
-        attempts,
-        status,
-        flight.start_pitch,
-        flight.start_twist,
-        flight.start_kinetic,
-    )
+    loss = flight.damping_loss + tried.loss if accepted else flight.damping_loss
+    evaluations = flight.evaluations + 13.0
+    onward = _reached(accepted, tried, flight)
+    return _onward(onward, next_step, loss, evaluations, attempts, status)
 
 
 @fused

@@ -28,18 +28,9 @@ def landing_pose(stance, sin_a, cos_a, sin_twist, cos_twist):
 
 @fused
 def landing_place(
-    stance,
-    pitch,
-    sin_a,
-    cos_a,
-    sin_twist,
-    cos_twist,
-    new_pitch,
-    new_sin_a,
-    new_cos_a,
-    sin_heading,
+    stance, pitch, sin_a, cos_a, sin_twist, cos_twist, new_pitch, new_sin_a, new_cos_a, sin_heading,
     cos_heading,
-):
+):  # fmt: skip
     """From the old contact reference point to the new one, along the old heading and to its right."""
     sin_pitch = sin_a * stance.cos_tilt - cos_a * stance.sin_tilt
     arm = 2.0 * stance.half_axle

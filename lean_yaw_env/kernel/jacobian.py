@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lean_yaw_env.kernel.blocks import derivatives_of
-from lean_yaw_env.kernel.compilation import entry_point
-from lean_yaw_env.kernel.records import Body, Command
+from lean_yaw_env.kernel.blocks import block_of, derivatives_of
+from lean_yaw_env.kernel.compilation import compiled_apart, entry_point
+from lean_yaw_env.kernel.records import FAILED, Body, Command
 from lean_yaw_env.kernel.step import ACTIVE
 
 INPUTS = ACTIVE.inputs
@@ -21,6 +21,14 @@ OUTPUTS = ACTIVE.outputs
 """Rows: the section state (5), then what else a step is judged by."""
 
 _run = derivatives_of(ACTIVE)
+_BLOCK = block_of(ACTIVE, INPUTS, OUTPUTS)
+_carefully = _BLOCK.carefully
+
+
+@compiled_apart(_BLOCK.name, _BLOCK.size, _BLOCK.ended, FAILED)
+def careful_derivatives(work, i):
+    """As ``careful_step``, with derivatives."""
+    _carefully(work, i)
 
 
 @entry_point()
@@ -41,14 +49,7 @@ def step_jacobian(
     status, outputs = np.empty(1), np.empty((1, len(OUTPUTS)))
     jacobian = np.empty((1, len(OUTPUTS), inputs))
     step_jacobians(
-        np.array([body]),
-        np.array([command]),
-        np.array([state]),
-        np.array([side]),
-        status,
-        outputs,
-        jacobian,
-        0,
-        1,
-    )
+        np.array([body]), np.array([command]), np.array([state]), np.array([side]), status, outputs, jacobian,
+        0, 1,
+    )  # fmt: skip
     return float(status[0]), outputs[0], jacobian[0]

@@ -62,6 +62,27 @@ def row_writer(record: type[Any]) -> Any:
     return _function("\n".join(("def write(value, row):", *lines)), record)
 
 
+def replacer(record: type[Any], *names: str) -> Any:
+    """``replace(value, name, ...)``: the record with new numbers in these fields."""
+    fields = (name if name in names else f"value.{name}" for name in record._fields)
+    return _function(
+        f"def replace(value, {', '.join(names)}):\n    return {record.__name__}({', '.join(fields)})",
+        record,
+    )
+
+
+def chooser(record: type[Any], other: type[Any]) -> Any:
+    """``choose(condition, new, value)``: the record, with all fields that ``new`` of type ``other`` has too if the condition holds."""
+    fields = (
+        f"new.{name} if condition else value.{name}" if name in other._fields else f"value.{name}"
+        for name in record._fields
+    )
+    return _function(
+        f"def choose(condition, new, value):\n    return {record.__name__}({', '.join(fields)})",
+        record,
+    )
+
+
 def _places(
     record: type[Any], place: int, carried: Sequence[str], derivatives: int
 ) -> list[tuple[str, int, int]]:

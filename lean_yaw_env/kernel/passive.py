@@ -21,6 +21,7 @@ from lean_yaw_env.kernel.flight import (
     time_to_touch,
 )
 from lean_yaw_env.kernel.heel_strike import impact, landing_place, landing_pose
+from lean_yaw_env.kernel.lanes import chooser, replacer, row_writer
 from lean_yaw_env.kernel.records import (
     BACKWARD,
     FAILED,
@@ -42,7 +43,7 @@ from lean_yaw_env.kernel.stance import (
     middle_of_masses,
     middle_position,
 )
-from lean_yaw_env.kernel.step import LANDING_RESIDUAL, stance_of
+from lean_yaw_env.kernel.step import LANDING_RESIDUAL, body_of, stance_of
 from lean_yaw_env.kernel.swinging_leg import (
     along_tangent,
     swing_hip_levers,
@@ -93,6 +94,10 @@ class PassiveFlight(NamedTuple):
     start_twist: float
     start_inter_leg: float
     start_kinetic: float
+
+
+_reached = chooser(PassiveFlight, PassiveFlight)
+_onward = replacer(PassiveFlight, "next_step", "attempts", "status")
 
 
 class PassiveOutcome(NamedTuple):
@@ -237,31 +242,11 @@ def _advance(c, flight):
         status = SIDEWAYS if _is_collapsing(c, x, b) else status
         status = SLIP if most > c.friction_limit_squared.real else status
         status = LIFT_OFF if least <= 0.0 else status
-    return PassiveFlight(
-        time if accepted else flight.time,
-        x if accepted else flight.pitch,
-        b if accepted else flight.twist,
-        d if accepted else flight.inter_leg,
-        w if accepted else flight.pitch_rate,
-        v if accepted else flight.twist_rate,
-        u if accepted else flight.inter_leg_rate,
-        dw if accepted else flight.pitch_acceleration,
-        dv if accepted else flight.twist_acceleration,
-        du if accepted else flight.inter_leg_acceleration,
-        gap if accepted else flight.gap,
-        gap_rate if accepted else flight.gap_rate,
-        gap_acceleration if accepted else flight.gap_acceleration,
-        front if accepted else flight.in_front,
-        next_step,
-        least if accepted else flight.least_normal_force,
-        most if accepted else flight.friction_squared,
-        attempts,
-        status,
-        flight.start_pitch,
-        flight.start_twist,
-        flight.start_inter_leg,
-        flight.start_kinetic,
-    )
+    reached = PassiveFlight(
+        time, x, b, d, w, v, u, dw, dv, du, gap, gap_rate, gap_acceleration, front, next_step,
+        least, most, attempts, status, flight.start_pitch, flight.start_twist, flight.start_inter_leg, flight.start_kinetic,
+    )  # fmt: skip
+    return _onward(_reached(accepted, reached, flight), next_step, attempts, status)
 
 
 @inlined
@@ -354,26 +339,11 @@ def _strike(c, heading, flight):
     gravity_work = _gravity_work(c, flight, x, b)
     sin_heading, cos_heading = sine_cosine(within_half_turn(heading))
     return PassiveOutcome(
-        heading + turn,
-        new_x,
-        -new_b,
-        new_w,
-        -new_v,
-        new_u,
-        -d,
-        status,
-        time,
-        ahead * cos_heading + aside * sin_heading,
-        aside * cos_heading - ahead * sin_heading,
-        turn,
-        flight.least_normal_force,
-        np.sqrt(flight.friction_squared),
-        gravity_work,
-        before - after,
-        flight.start_kinetic + gravity_work - before,
-        flight.start_inter_leg,
-        13.0 * flight.attempts,
-    )
+        heading + turn, new_x, -new_b, new_w, -new_v, new_u, -d, status, time,
+        ahead * cos_heading + aside * sin_heading, aside * cos_heading - ahead * sin_heading, turn,
+        flight.least_normal_force, np.sqrt(flight.friction_squared), gravity_work, before - after,
+        flight.start_kinetic + gravity_work - before, flight.start_inter_leg, 13.0 * flight.attempts,
+    )  # fmt: skip
 
 
 @inlined
@@ -381,26 +351,11 @@ def _fall(c, heading, flight):
     """The outcome of a flight that ended otherwise: where the walker was."""
     nothing = 0.0 * flight.pitch
     return PassiveOutcome(
-        heading + nothing,
-        flight.pitch,
-        -flight.twist,
-        flight.pitch_rate,
-        -flight.twist_rate,
-        flight.inter_leg_rate,
-        flight.inter_leg,
-        flight.status,
-        flight.time,
-        nothing,
-        nothing,
-        nothing,
-        flight.least_normal_force,
-        np.sqrt(flight.friction_squared),
-        _gravity_work(c, flight, flight.pitch, flight.twist),
-        nothing,
-        nothing,
-        flight.start_inter_leg,
-        13.0 * flight.attempts,
-    )
+        heading + nothing, flight.pitch, -flight.twist, flight.pitch_rate, -flight.twist_rate,
+        flight.inter_leg_rate, flight.inter_leg, flight.status, flight.time, nothing, nothing, nothing,
+        flight.least_normal_force, np.sqrt(flight.friction_squared), _gravity_work(c, flight, flight.pitch, flight.twist),
+        nothing, nothing, flight.start_inter_leg, 13.0 * flight.attempts,
+    )  # fmt: skip
 
 
 @inlined
@@ -415,6 +370,9 @@ def passive_step(
     return _strike(c, heading, flight) if flight.status == LANDING else _fall(c, heading, flight)
 
 
+_write_outcome = row_writer(PassiveOutcome)
+
+
 @entry_point()
 def passive_batch(bodies, states, inter_legs, sides, results, first, last):
     """Step walkers ``first`` to ``last`` - 1.
@@ -423,30 +381,10 @@ def passive_batch(bodies, states, inter_legs, sides, results, first, last):
     down, ``sides`` (n,), ``results`` (n, 19) in the order of ``PassiveOutcome``.
     """
     for i in range(first, last):
-        p = bodies[i if bodies.shape[0] > 1 else 0]
-        body = Body(p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10])
+        body = body_of(bodies[i if bodies.shape[0] > 1 else 0])
         s = states[i]
         outcome = passive_step(body, s[0], s[1], s[2], s[3], s[4], s[5], inter_legs[i], sides[i])
-        row = results[i]
-        row[0] = outcome.heading
-        row[1] = outcome.stance_pitch
-        row[2] = outcome.ankle_angle
-        row[3] = outcome.stance_pitch_rate
-        row[4] = outcome.ankle_rate
-        row[5] = outcome.inter_leg_rate
-        row[6] = outcome.inter_leg_angle
-        row[7] = outcome.status
-        row[8] = outcome.duration
-        row[9] = outcome.displacement_x
-        row[10] = outcome.displacement_z
-        row[11] = outcome.heading_change
-        row[12] = outcome.least_normal_force
-        row[13] = outcome.greatest_friction
-        row[14] = outcome.gravity_work
-        row[15] = outcome.impact_loss
-        row[16] = outcome.ankle_loss
-        row[17] = outcome.start_inter_leg_angle
-        row[18] = outcome.evaluations
+        _write_outcome(outcome, results[i])
 
 
 @entry_point()
@@ -457,43 +395,24 @@ def passive_jacobian(body, state, side, after, jacobian):
     damping. Both feet are on the floor at the start, so the inter-leg angle's share is in.
     """
     status = 0.0
+    z = np.empty(INPUTS, np.complex128)
     for column in range(INPUTS):
-        seed = 1j * _TINY
+        for k in range(6):
+            z[k], z[6 + k] = state[k], body[k]
+        z[column] += 1j * _TINY
         outcome = passive_step(
             Body(
-                body.hip_width + (seed if column == 6 else 0j),
-                body.foot_radius + (seed if column == 7 else 0j),
-                body.ankle_tilt + (seed if column == 8 else 0j),
-                body.slope + (seed if column == 9 else 0j),
-                body.ankle_stiffness + (seed if column == 10 else 0j),
-                body.ankle_damping + (seed if column == 11 else 0j),
-                body.shift_time,
-                body.friction_limit,
-                body.max_step_duration,
-                body.slope_turns,
-                body.strike_at_start,
+                z[6], z[7], z[8], z[9], z[10], z[11], body.shift_time, body.friction_limit,
+                body.max_step_duration, body.slope_turns, body.strike_at_start,
             ),
-            state[0] + (seed if column == 0 else 0j),
-            state[1] + (seed if column == 1 else 0j),
-            state[2] + (seed if column == 2 else 0j),
-            state[3] + (seed if column == 3 else 0j),
-            state[4] + (seed if column == 4 else 0j),
-            state[5] + (seed if column == 5 else 0j),
-            np.nan,
-            side,
-        )
-        jacobian[0, column] = outcome.heading.imag / _TINY
-        jacobian[1, column] = outcome.stance_pitch.imag / _TINY
-        jacobian[2, column] = outcome.ankle_angle.imag / _TINY
-        jacobian[3, column] = outcome.stance_pitch_rate.imag / _TINY
-        jacobian[4, column] = outcome.ankle_rate.imag / _TINY
-        jacobian[5, column] = outcome.inter_leg_rate.imag / _TINY
-        after[0] = outcome.heading.real
-        after[1] = outcome.stance_pitch.real
-        after[2] = outcome.ankle_angle.real
-        after[3] = outcome.stance_pitch_rate.real
-        after[4] = outcome.ankle_rate.real
-        after[5] = outcome.inter_leg_rate.real
+            z[0], z[1], z[2], z[3], z[4], z[5], np.nan, side,
+        )  # fmt: skip
+        ends = (
+            outcome.heading, outcome.stance_pitch, outcome.ankle_angle, outcome.stance_pitch_rate,
+            outcome.ankle_rate, outcome.inter_leg_rate,
+        )  # fmt: skip
+        for k in range(6):
+            after[k], jacobian[k, column] = ends[k].real, ends[k].imag / _TINY
         status = outcome.status
     return status
 
@@ -517,12 +436,6 @@ def passive_trace(body, state, inter_leg, side, duration, rows):
             x, b, d, w, v, u, _ = swinging_step(c, x, b, d, w, v, u, dw, dv, du, h)
             t = t + h
         dw, dv, du = swinging_accelerations(c, x, b, d, w, v, u)
-        row = rows[i]
-        row[0] = t
-        row[1] = x
-        row[2] = -b
-        row[3] = d
-        row[4] = w
-        row[5] = -v
-        row[6] = u
-        row[7] = swinging_gap(c, x, b, d, w, v, u, dw, dv, du)[0]
+        gap = swinging_gap(c, x, b, d, w, v, u, dw, dv, du)[0]
+        for k, value in enumerate((t, x, -b, d, w, -v, u, gap)):
+            rows[i, k] = value

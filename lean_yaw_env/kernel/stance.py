@@ -128,16 +128,9 @@ def _balance(stance, pose, pitch_rate, twist_rate):
     Also returned: what the contact force needs, which is gravity less velocity products along e1, a and e3.
     """
     b1, ba, b3 = velocity_products(
-        stance,
-        pose.sin_twist,
-        pose.cos_twist,
-        pose.q,
-        pose.dq,
-        pitch_rate,
-        twist_rate,
-        pose.offset_rate,
+        stance, pose.sin_twist, pose.cos_twist, pose.q, pose.dq, pitch_rate, twist_rate, pose.offset_rate,
         pose.offset_acceleration,
-    )
+    )  # fmt: skip
     along_e1 = stance.gravity_x * pose.cos_a + stance.gravity_y * pose.sin_a - b1
     along_a = stance.gravity_x * pose.sin_a - stance.gravity_y * pose.cos_a - ba
     along_e3 = stance.gravity_z - b3

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from lean_yaw_env.kernel.blocks import Model
+from lean_yaw_env.kernel.blocks import Model, block_of
 from lean_yaw_env.kernel.careful import fly_carefully
-from lean_yaw_env.kernel.compilation import apart, entry_point, fused, inlined
+from lean_yaw_env.kernel.compilation import called, compiled_apart, entry_point, fused, inlined
 from lean_yaw_env.kernel.elementary import quotient, sine_cosine, within_half_turn
 from lean_yaw_env.kernel.flight import (
     advance,
@@ -65,26 +65,13 @@ def stance_of(body, command, heading, side):
     turns = body.slope_turns.real != 0.0
     sin_inter_leg, cos_inter_leg = sine_cosine(command.inter_leg_angle)
     return Stance(
-        body.foot_radius,
-        body.ankle_tilt,
-        sin_tilt,
-        cos_tilt,
-        0.5 * side * body.hip_width,
-        0.25 * body.hip_width * body.hip_width,
-        sin_slope if turns else sin_slope * cos_heading,
-        -cos_slope,
-        0.0 * sin_slope if turns else sin_slope * sin_heading,
-        sin_inter_leg,
-        cos_inter_leg,
-        body.ankle_stiffness,
-        body.ankle_damping,
-        command.previous_offset,
-        command.mass_offset - command.previous_offset,
-        1.0 / body.shift_time,
-        body.friction_limit * body.friction_limit,
-        body.max_step_duration,
-        heading,
-    )
+        body.foot_radius, body.ankle_tilt, sin_tilt, cos_tilt, 0.5 * side * body.hip_width,
+        0.25 * body.hip_width * body.hip_width, sin_slope if turns else sin_slope * cos_heading, -cos_slope,
+        0.0 * sin_slope if turns else sin_slope * sin_heading, sin_inter_leg, cos_inter_leg,
+        body.ankle_stiffness, body.ankle_damping, command.previous_offset,
+        command.mass_offset - command.previous_offset, 1.0 / body.shift_time,
+        body.friction_limit * body.friction_limit, body.max_step_duration, heading,
+    )  # fmt: skip
 
 
 @fused
@@ -215,18 +202,8 @@ def finish(stance, flight):
         landing_pose(stance, sin_a, cos_a, sin_twist, cos_twist)
     )
     ahead, aside = landing_place(
-        stance,
-        x,
-        sin_a,
-        cos_a,
-        sin_twist,
-        cos_twist,
-        new_x,
-        new_sin_a,
-        new_cos_a,
-        sin_turn,
-        cos_turn,
-    )
+        stance, x, sin_a, cos_a, sin_twist, cos_twist, new_x, new_sin_a, new_cos_a, sin_turn, cos_turn,
+    )  # fmt: skip
     new_w, new_v, before, after = impact(
         stance, sin_a, cos_a, sin_twist, cos_twist, w, v, offset, offset_rate,
         new_sin_a, new_cos_a, new_sin_twist, new_cos_twist,
@@ -279,24 +256,11 @@ def finish(stance, flight):
     )
 
 
-@apart
+@called
 def walk_carefully(body, command, state, side):
     """A walking step whose landing ``advance`` has not found."""
     stance, flight = begin(body, command, state, side)
     return finish(stance, fly_carefully(stance, flight))
-
-
-@inlined
-def walking_step(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side):
-    """One walking step; numbers may be complex to carry a derivative, every decision looks at real parts."""
-    state = SectionState(heading, pitch, ankle, pitch_rate, ankle_rate)
-    stance, flight = begin(body, command, state, side)
-    while flight.status == FLYING:
-        flight = advance(stance, flight)
-    outcome = finish(stance, flight)
-    if outcome.status == FAILED:
-        outcome = walk_carefully(body, command, state, side)
-    return outcome
 
 
 ACTIVE = Model(
@@ -318,8 +282,31 @@ ACTIVE = Model(
     advance=advance,
     finish=finish,
     carefully=walk_carefully,
+    name="lean_yaw_careful_step",
 )
 """The walker whose swing leg is held in front."""
+
+BLOCK = block_of(ACTIVE)
+_carefully, _walk_carefully = BLOCK.carefully, BLOCK.walk_carefully
+
+
+@compiled_apart(BLOCK.name, BLOCK.size, BLOCK.ended, FAILED)
+def careful_step(work, i):
+    """The step in lane ``i`` of a block's work array, whose landing ``advance`` has not found."""
+    _carefully(work, i)
+
+
+@inlined
+def walking_step(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side):
+    """One walking step; numbers may be complex to carry a derivative, every decision looks at real parts."""
+    state = SectionState(heading, pitch, ankle, pitch_rate, ankle_rate)
+    stance, flight = begin(body, command, state, side)
+    while flight.status == FLYING:
+        flight = advance(stance, flight)
+    outcome = finish(stance, flight)
+    if outcome.status == FAILED:
+        outcome = _walk_carefully(body, command, state, side)
+    return outcome
 
 
 body_of = row_reader(Body)
@@ -333,14 +320,6 @@ def step(body, command, state, side, outcome):
 
     The result is written to ``outcome`` (18,), in the order of ``Outcome``: passing arrays takes a third of the time of boxed tuples.
     """
-    result = walking_step(
-        body_of(body),
-        command_of(command),
-        state[0],
-        state[1],
-        state[2],
-        state[3],
-        state[4],
-        side,
-    )
+    s = state
+    result = walking_step(body_of(body), command_of(command), s[0], s[1], s[2], s[3], s[4], side)
     write_outcome(result, outcome)

@@ -100,16 +100,8 @@ def gap_motion(
 
 @fused
 def foot_gap(
-    stance,
-    sin_a,
-    cos_a,
-    sin_twist,
-    cos_twist,
-    pitch_rate,
-    twist_rate,
-    pitch_acceleration,
-    twist_acceleration,
-):
+    stance, sin_a, cos_a, sin_twist, cos_twist, pitch_rate, twist_rate, pitch_acceleration, twist_acceleration,
+):  # fmt: skip
     """Height of the held swing foot above touching the floor, its rate and its acceleration, and E of ``swing_axis``."""
     y, e, s = swing_axis(stance, sin_a, cos_a, sin_twist, cos_twist)
     y_rate, y_acceleration, e_rate, e_acceleration = axis_motion(

@@ -15,6 +15,7 @@ from typing import NamedTuple
 from lean_yaw_env.kernel import verner
 from lean_yaw_env.kernel.compilation import inlined
 from lean_yaw_env.kernel.elementary import sine_cosine, within_half_turn
+from lean_yaw_env.kernel.lanes import replacer
 from lean_yaw_env.kernel.records import Stance
 from lean_yaw_env.kernel.stance import Pose, accelerations_in, pose_of, velocity_products
 from lean_yaw_env.kernel.swing import axis_motion, gap_motion, swing_axis
@@ -22,17 +23,14 @@ from lean_yaw_env.kernel.swing import axis_motion, gap_motion, swing_axis
 # Newton's method doubles the digits each time; a walker's start is known to 10 % beforehand.
 _NEWTON_STEPS = 12
 
+_at_angle = replacer(Stance, "sin_inter_leg", "cos_inter_leg")
+
 
 @inlined
 def with_inter_leg_angle(c, inter_leg):
     """A step's constants with the swing leg at this angle, for the formulas of the leg held."""
     sine, cosine = sine_cosine(within_half_turn(inter_leg))
-    return Stance(
-        c.radius, c.tilt, c.sin_tilt, c.cos_tilt, c.half_axle, c.axle_inertia,
-        c.gravity_x, c.gravity_y, c.gravity_z, sine, cosine,
-        c.ankle_stiffness, c.ankle_damping, c.previous_offset, c.offset_change, c.shift_rate,
-        c.friction_limit_squared, c.max_duration, c.heading,
-    )  # fmt: skip
+    return _at_angle(c, sine, cosine)
 
 
 @inlined

@@ -22,20 +22,9 @@ from lean_yaw_env.kernel.step import stance_of
 _LONGEST = 0.05
 
 COLUMNS = (
-    "time",
-    "stance_pitch",
-    "ankle_angle",
-    "stance_pitch_rate",
-    "ankle_rate",
-    "mass_offset",
-    "centre_x",
-    "centre_y",
-    "centre_z",
-    "normal_force",
-    "friction_demand",
-    "yaw_torque",
-    "mechanical_energy",
-)
+    "time", "stance_pitch", "ankle_angle", "stance_pitch_rate", "ankle_rate", "mass_offset",
+    "centre_x", "centre_y", "centre_z", "normal_force", "friction_demand", "yaw_torque", "mechanical_energy",
+)  # fmt: skip
 """What a row holds; the centre of mass is in the stance frame (ahead, up, right), the energy is kinetic plus potential in it."""
 
 
@@ -79,16 +68,9 @@ def trace(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side, du
         px, py, pz = middle_position(c, x, sin_a, cos_a, q, dq)
         along = sin_b * (-u * w + dq * v) - cos_b * q * v
         energy = kinetic_energy(m11, m12, m22, w, v) + offset_rate * (along + 0.5 * offset_rate)
-        rows[i, 0] = t
-        rows[i, 1] = x
-        rows[i, 2] = -b
-        rows[i, 3] = w
-        rows[i, 4] = -v
-        rows[i, 5] = offset
-        rows[i, 6] = px
-        rows[i, 7] = py
-        rows[i, 8] = pz
-        rows[i, 9] = normal
-        rows[i, 10] = np.sqrt(ahead * ahead + aside * aside) / normal
-        rows[i, 11] = _yaw_torque(c, t, x, b, w, v, dw, dv, ahead, aside)
-        rows[i, 12] = energy - c.gravity_x * px - c.gravity_y * py - c.gravity_z * pz
+        friction = np.sqrt(ahead * ahead + aside * aside) / normal
+        torque = _yaw_torque(c, t, x, b, w, v, dw, dv, ahead, aside)
+        energy = energy - c.gravity_x * px - c.gravity_y * py - c.gravity_z * pz
+        row = (t, x, -b, w, -v, offset, px, py, pz, normal, friction, torque, energy)
+        for k, value in enumerate(row):
+            rows[i, k] = value

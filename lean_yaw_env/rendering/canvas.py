@@ -53,7 +53,9 @@ class Canvas:
 
     def array(self) -> np.ndarray:
         """The finished picture; shape (height, width, 3), uint8."""
-        return self._pygame.surfarray.array3d(self.surface()).swapaxes(0, 1).copy()
+        width, height = self._size
+        pixels = self._pygame.image.tobytes(self.surface(), "RGB")  # faster than pygame's arrays
+        return np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, 3).copy()
 
     def clip(self, panel: Panel | None) -> None:
         """Keep what follows within a panel; None ends that."""

@@ -51,8 +51,9 @@ MASS_RADIUS = 0.05
 """Of a drawn mass, leg lengths; the model's are points."""
 AXIS_ABOVE, AXIS_BELOW = 0.3, 0.12
 """How far a drawn ankle axis goes up and down from the sole, in leg lengths."""
-_REACH = 9  # leg lengths of floor around the walker that have lines and prints
-_SKY_BANDS = 24
+_REACH = 8  # leg lengths of floor around the walker that have lines and prints
+_WAY_BEHIND = 1.5  # leg lengths of the walker's way that the camera turns with: some five steps
+_BANDS = 24  # of sky and haze
 _SHADOW = mixed(FLOOR, INK, 0.13)
 _OLD_PRINT = 0.55  # how much prints have faded
 
@@ -63,7 +64,7 @@ _Part = tuple[float, Callable[..., None], tuple[Any, ...]]
 def draw_perspective_view(canvas: Canvas, panel: Panel, scene: Scene, shape: WalkerShape) -> None:
     """Draw the walker from behind, above and the right, as the camera on the web page follows it."""
     canvas.clip(panel)
-    camera = _camera(panel, scene, shape)
+    camera = following_camera(panel, scene, shape)
     _draw_sky_and_floor(canvas, camera)
     _draw_floor_marks(canvas, camera, scene, shape)
     _draw_shadows(canvas, camera, shape)
@@ -75,32 +76,40 @@ def draw_perspective_view(canvas: Canvas, panel: Panel, scene: Scene, shape: Wal
     canvas.clip(None)
 
 
-def _camera(panel: Panel, scene: Scene, shape: WalkerShape) -> PerspectiveCamera:
+def following_camera(panel: Panel, scene: Scene, shape: WalkerShape) -> PerspectiveCamera:
+    """A camera that goes along with the walker, and turns with the way behind it: continuously, where headings jump at heel strike."""
     up = upward(scene.parameters, float(scene.pose.state[0]))
-    ahead = np.array([math.cos(scene.heading), 0.0, -math.sin(scene.heading)])
-    right = np.array([math.sin(scene.heading), 0.0, math.cos(scene.heading)])
+    middle = shape.centre[[0, 2]]
+    along = middle - _behind(scene, middle)
+    angle = math.atan2(along[1], along[0])
+    cosine, sine = math.cos(angle), math.sin(angle)
     size = 1.0 + 0.4 * max(scene.parameters.hip_width - 0.5, 0.0)
-    target = shape.centre * np.array([1.0, 0.0, 1.0]) + np.array([0.0, MIDDLE, 0.0])
-    eye = target + size * (EYE @ np.array([ahead, up, right]))
-    return perspective_camera(panel, eye, target, up, VIEW_ANGLE)
+    axes = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+    target = np.array([middle[0], MIDDLE, middle[1]])
+    return perspective_camera(panel, target + size * EYE @ axes, target, up, VIEW_ANGLE)
+
+
+def _behind(scene: Scene, middle: Vector) -> Vector:
+    """A place on the walker's way that is ``_WAY_BEHIND`` behind it; the way begins with a straight piece."""
+    heading = float(scene.headings[0]) if len(scene.headings) else float(scene.pose.state[0])
+    way = np.vstack([middle, scene.path[::-1]])
+    start = way[-1] - _WAY_BEHIND * np.array([math.cos(heading), -math.sin(heading)])
+    way = np.vstack([way, start])
+    lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1)))
+    return np.array([np.interp(_WAY_BEHIND, lengths, column) for column in way.T])
 
 
 def _draw_sky_and_floor(canvas: Canvas, camera: PerspectiveCamera) -> None:
-    panel = camera.panel
-    horizon = camera.horizon()
-    height = max(horizon.min() - panel.top, 0.0)
-    for band in range(_SKY_BANDS):
-        share = band / _SKY_BANDS
-        strip = Panel(panel.left, panel.top + share * height, panel.width, height / _SKY_BANDS + 2)
-        canvas.rectangle(strip, mixed(HORIZON, ZENITH, 0.55 * (1.0 - share) ** 1.5))
+    """The sky darkens upward from the horizon; haze lies over the far floor."""
+    panel, horizon = camera.panel, camera.horizon()
+    canvas.rectangle(panel, FLOOR)
     edge = np.column_stack([[panel.left, panel.right], horizon])
-    corners = [[panel.right, panel.bottom], [panel.left, panel.bottom]]
-    canvas.polygon(np.vstack([edge, corners]), FLOOR)
-    for band in range(_SKY_BANDS):  # haze over the far floor
-        share = band / _SKY_BANDS
-        top, bottom = (0.22 * panel.height * s**1.5 for s in (share, share + 0.05))
-        strip = np.vstack([np.add(edge, [0.0, top]), np.add(edge, [0.0, bottom + 1.0])[::-1]])
-        canvas.polygon(strip, mixed(HORIZON, FLOOR, share))
+    sky, haze = panel.top - horizon.max(), 0.2 * panel.height
+    for low, high in pairwise(np.linspace(0.0, 1.0, _BANDS + 1).tolist()):
+        tone = mixed(HORIZON, ZENITH, 0.55 * low**1.5), mixed(HORIZON, FLOOR, low)
+        for height, colour, seam in ((sky, tone[0], -1.0), (haze, tone[1], 1.0)):
+            far_edge = np.add(edge, [0.0, height * high + seam])[::-1]
+            canvas.polygon(np.vstack([np.add(edge, [0.0, height * low]), far_edge]), colour)
 
 
 def _draw_floor_marks(
@@ -114,7 +123,7 @@ def _draw_floor_marks(
             ends = np.array([middle - _REACH, middle + _REACH])
             ends[:, axis] = line
             colour = GRID if line % 5 else STRONG_GRID
-            _draw_faded(canvas, camera, np.linspace(ends[0], ends[1], 2 * _REACH + 1), colour, 1.0)
+            _draw_faded(canvas, camera, np.linspace(ends[0], ends[1], _REACH + 1), colour, 1.0)
     if scene.reference_path is not None:
         near = np.abs(scene.reference_path - middle).max(axis=1) < 2 * _REACH
         _draw_faded(canvas, camera, scene.reference_path[near], REFERENCE, 2.0)

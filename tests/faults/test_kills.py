@@ -31,7 +31,7 @@ def killed(kind: str, folder: Path) -> int:
     kills = 0
     for _ in range(KILLS):
         process = start(work.go_on, kind, folder / "killed", log=folder / "log")
-        process.join(moments.uniform(0.0, 0.35 * duration))
+        process.join(moments.uniform(0.0, 0.25 * duration))
         process.kill()
         process.join()
         kills += process.exitcode == -signal.SIGKILL

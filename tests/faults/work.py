@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 
 from agents.evaluation.plan import Evaluation
-from agents.learning.apg import GradientSettings
-from agents.learning.her import HERSettings
 from agents.learning.ppo import PPOSettings
 from agents.learning.runs import Training, make_run, run
 from agents.learning.sac import SACSettings
@@ -20,24 +18,20 @@ from lean_yaw_env import Walker
 from lean_yaw_env.analysis import basin, stability_map, storage
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.paper import reproduce, write_report
-from lean_yaw_env.registration import GOAL_ENV_ID
 
 SHORT = EnvOptions(horizon=15.0)
 HEADING = "LeanYaw/Heading-v0"
 SETTINGS: dict[str, Any] = {
     "ppo": PPOSettings(steps=4096, walkers=8, steps_per_update=32, batch_size=128, hidden=(8, 8)),
     "sac": SACSettings(steps=640, walkers=8, gradient_steps=1, batch_size=32, buffer_size=400, random_steps=64, hidden=(8, 6)),
-    "her": HERSettings(steps=640, walkers=8, gradient_steps=1, batch_size=32, buffer_size=480, random_steps=240, hidden=(8, 6)),
-    "apg": GradientSettings(steps=1536, walkers=8, window=16, critic_first=256, critic_batches=4, hidden=(8, 8)),
 }  # fmt: skip
 
 
 def begin(kind: str, folder: Path) -> None:
     """What there is before the work begins."""
     if kind in SETTINGS:
-        env_id = GOAL_ENV_ID if kind == "her" else HEADING
         training = Training(
-            env_id, 0, SETTINGS[kind], SHORT, episodes=2, checkpoint_seconds=0.0, algorithm=kind
+            HEADING, 0, SETTINGS[kind], SHORT, episodes=2, checkpoint_seconds=0.0, algorithm=kind
         )
         make_run(training, folder / "run")
     elif kind == "series":
@@ -74,7 +68,10 @@ def _analysis(kind: str, folder: Path) -> Any:
     if kind == "map":
         axes = {"hip_width": np.linspace(0.1, 0.5, 70), "slope": np.linspace(0.005, 0.05, 70)}
         return stability_map(Walker(), axes, path=folder / "map.nc")
-    first, second = ("lean", np.linspace(-0.1, 0.1, 60)), ("heading", np.linspace(-0.5, 0.5, 60))
+    first, second = (
+        ("ankle_angle", np.linspace(-0.1, 0.1, 60)),
+        ("heading", np.linspace(-0.5, 0.5, 60)),
+    )
     return basin(Walker(), first, second, n_steps=60, path=folder / "basin.nc")
 
 
