@@ -177,16 +177,13 @@ def capture(
     require_count("settle_steps", settle_steps, 1, 1_000_000)
     require_count("threads", threads, 1, 1024)
     states = require_shape("states", states, (None, len(section_map.names)))
-    if known is not None and require_instance("known", known, Capture).plans.shape != (
-        len(states),
-        most_steps,
-        2,
-    ):
-        raise ValueError(f"known must be of the same states and most_steps, got {known!r}")
     require_instance("choices", choices, Choices)
+    size = (len(states), most_steps, 2)
+    if known is not None and require_instance("known", known, Capture).plans.shape != size:
+        raise ValueError(f"known must be of the same states and most_steps, got {known!r}")
     search = _Search(section_map, choices, choices.commands, settle_steps)
     least = np.full(len(states), most_steps + 1)
-    plans = np.full((len(states), most_steps, 2), np.nan)
+    plans = np.full(size, np.nan)
     if known is not None:
         least[:], plans[:] = known.least_steps, known.plans
     carried = np.full(len(states), section_map.carried)
