@@ -72,7 +72,8 @@ class ObservationLayout:
                 raise ValueError(
                     f"observation must be as the environment gives it, got {observation!r}"
                 ) from error
-        array = require_observation(observation)
+        seen: Any = observation
+        array = require_observation(seen)
         if array.shape[-1] != len(self.names):
             raise ValueError(
                 f"observation must have shape (..., {len(self.names)}) of {', '.join(self.names)}, got {array.shape}"
