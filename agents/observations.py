@@ -64,15 +64,15 @@ class ObservationLayout:
         ValueError
             If it has another shape, or a number is not finite.
         """
+        seen: Any = observation
         if isinstance(observation, Mapping):
             mirror = COMMON_NAMES[STANCE_FOOT] not in self.names
             try:
-                observation = seen_from_walker(observation, mirror=mirror)
+                seen = seen_from_walker(observation, mirror=mirror)
             except (KeyError, IndexError, TypeError) as error:
                 raise ValueError(
                     f"observation must be as the environment gives it, got {observation!r}"
                 ) from error
-        seen: Any = observation
         array = require_observation(seen)
         if array.shape[-1] != len(self.names):
             raise ValueError(

@@ -136,3 +136,7 @@ def test_agents_of_the_task_act_on_dictionaries_too(name: str) -> None:
         observation, reward, terminated, truncated, _ = env.step(action)
         ends = terminated or truncated
     assert (reward == 1.0) == (name in ("lqr", "her"))
+
+
+def test_the_package_s_agent_of_the_goal_environment_is_loaded_by_its_id_alone():
+    assert agents.load("LeanYaw/WaypointGoal-v0").card.algorithm == "her"

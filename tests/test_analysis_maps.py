@@ -14,6 +14,7 @@ from lean_yaw_env.analysis import (
     gait_map,
     largest_disturbance,
     load_dataset,
+    map_cost,
     save_dataset,
     section_map_of,
     stability_map,
@@ -282,3 +283,11 @@ def test_no_point_without_a_gait_has_a_neighbour_whose_gait_leads_to_one() -> No
             points = {name: values[k] for (name, values), k in zip(axes.items(), points[lacks].T, strict=True)}  # fmt: skip
             rows = gait_map.gaits_at(section_map, points, guesses[lacks], 1)
             assert not (rows["status"] == gait_map.FOUND).any()
+
+
+def test_a_map_beyond_memory_is_refused_before_it_begins() -> None:
+    axes = {"hip_width": np.linspace(0.1, 0.5, 100_000), "slope": np.linspace(0.01, 0.05, 100_000)}
+    with pytest.raises(ValueError, match=r"10,000,000,000, which take about .* GB"):
+        stability_map(Walker(), axes)
+    size, seconds = map_cost(Walker(), axes)
+    assert size > 1e12 and seconds > 1e5

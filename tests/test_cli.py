@@ -370,3 +370,15 @@ def test_numbers_on_the_screen_have_six_digits() -> None:
     assert text_of(None) == "none"
     assert text_of(True) == "yes"
     assert text_of([1.0, 2.5]) == "1 to 2.5"
+
+
+def test_a_large_map_says_what_it_costs_and_one_beyond_memory_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("lean_yaw_env.cli.app._MANY_POINTS", 3)
+    result = runner.invoke(app, ["map", "slope=0.005:0.05:4"])
+    assert result.exit_code == 0
+    assert "4 points: about" in result.output and "GB of memory and" in result.output
+    result = runner.invoke(app, ["map", "slope=0.005:0.05:100000", "hip_width=0.1:0.5:100000"])
+    assert result.exit_code == 2
+    assert "10,000,000,000, which take about" in result.output

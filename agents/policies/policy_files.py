@@ -11,7 +11,7 @@ from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.files import read_json, read_regular, require_path, write_json, written_whole
 from lean_yaw_env.parameters import WalkerParameters
-from lean_yaw_env.registration import ALL_ENV_IDS, NAMESPACE, TASK_IDS
+from lean_yaw_env.registration import ALL_ENV_IDS, GOAL_ENV_ID, NAMESPACE, TASK_IDS
 from lean_yaw_env.validation import require_instance, require_seed, require_text
 
 from ..observations import ObservationLayout
@@ -85,7 +85,7 @@ def load(
     ----------
     source : an environment's id, for the agent that comes with the package, or a folder
     env_id : the environment that the policy is wanted for; any by default
-    algorithm : that trained the policy; by default PPO for the package's agents, and any for a folder
+    algorithm : that trained the policy; by default PPO for the package's agents (HER for WaypointGoal), and any for a folder
     seed : of the package's agent for that id and algorithm; the lowest one by default
 
     Raises
@@ -103,7 +103,9 @@ def load(
             require_text(argument, value)
     if name.startswith(f"{NAMESPACE}/"):
         require_env_id(name)
-        folder = shipped_folder(name, algorithm or DEFAULT_ALGORITHM, seed)
+        folder = shipped_folder(
+            name, algorithm or ("her" if name == GOAL_ENV_ID else DEFAULT_ALGORITHM), seed
+        )
         env_id = name if env_id is None else env_id
     else:
         folder = Path(source)

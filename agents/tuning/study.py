@@ -42,7 +42,8 @@ _AS_THEY_ARE = "as_they_are"
 """Marks the trial of the settings that come with the package."""
 _PROCESS = "process"
 _AGAIN = "again"
-"""Marks the trial that tries an unfinished one again, by the number of that one."""
+_VALUES = "enqueued"
+"""Mark the trial that tries an unfinished one again, by the number and the values of that one."""
 
 
 @dataclass(frozen=True)
@@ -234,14 +235,16 @@ def _take_up(study: optuna.Study, space: Space) -> None:
         if host == platform.node() and not (process and is_running(process)):
             study.tell(trial.number, state=TrialState.FAIL)
     trials = study.get_trials(deepcopy=False)
-    enqueued = [] if trials else [(dict(space.start), {_AS_THEY_ARE: True})]
+    enqueued: list[tuple[dict[str, Any], dict[str, Any]]] = []
+    if not trials:
+        enqueued.append((dict(space.start), {_AS_THEY_ARE: True}))
     again = {trial.user_attrs.get(_AGAIN) for trial in trials}
     for trial in trials:
         if trial.state is TrialState.FAIL and trial.number not in again:
-            is_first = _AS_THEY_ARE in trial.user_attrs
-            attributes: dict[str, Any] = {_AGAIN: trial.number}
-            attributes |= {_AS_THEY_ARE: True} if is_first else {}
-            enqueued.append((dict(space.start) if is_first else trial.params, attributes))
+            first = {_AS_THEY_ARE: True} if _AS_THEY_ARE in trial.user_attrs else {}
+            # what was enqueued may have been killed before it took its values
+            values = dict(space.start) if first else trial.user_attrs.get(_VALUES, trial.params)
+            enqueued.append((values, {_AGAIN: trial.number, _VALUES: values, **first}))
     with warnings.catch_warnings():
         # the settings as they are may lie outside what is searched; Optuna says so and takes these values
         warnings.simplefilter("ignore", UserWarning)

@@ -23,6 +23,7 @@ KILLS = 20
 def killed(kind: str, folder: Path) -> int:
     """Begin the work and kill it, ``KILLS`` times, at moments over all that it takes; how often it was killed before its end."""
     moments = random.Random(kind)
+    start(work.leftovers, folder).join()  # begins the server, which imports everything
     began = time.monotonic()
     whole = start(work.go_on, kind, folder / "whole", log=folder / "log")
     whole.join()
