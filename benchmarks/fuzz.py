@@ -3,6 +3,9 @@
 ``python -m benchmarks.fuzz --seconds 60`` draws bodies over the whole of their ranges and around the paper's, springs and dampers, slopes to
 0.5 either way, masses that rest or move, states around gaits, far from them, and of walks pushed at levels to 10. It prints how many
 steps ended how, and each failure as numbers that reproduce it; it exits with 1 if there was one.
+
+``--edges`` looks where failures are likely: between two walkers next to each other of which one steps and the other falls or steps later, it bisects
+the states down to neighbouring numbers. On the way a swing foot grazes the floor, or a fall is next to none.
 """
 
 from __future__ import annotations
@@ -29,7 +32,9 @@ FASTEST_ANKLE = 300.0
 _NAMES = ("stepped", "backward", "sideways", "trip", "lift_off", "slip", "no_strike", "FAILED")
 NAMES = {getattr(records, name.upper()): name.replace("_", " ") for name in _NAMES}
 _STATUS = Outcome._fields.index("status")
+_DURATION = Outcome._fields.index("duration")
 _OFFSET = Outcome._fields.index("mass_offset")
+_HALVINGS = 54  # leave neighbouring numbers
 _GAIT = np.array([0.0, 0.155, -0.004, -0.415, -0.07])
 
 
@@ -109,17 +114,55 @@ class Fuzz:
         self.counts: Counter[float] = Counter()
         self.failures: list[Vector] = []
 
+    def _outcomes(self, bodies: Vector, commands: Vector, states: Vector, sides: Vector) -> Vector:
+        """Step walkers, and count how the steps end."""
+        outcomes = np.empty((len(states), len(Outcome._fields)))
+        step_batch(bodies, commands, states, sides, outcomes, 0, len(states))
+        status = outcomes[:, _STATUS]
+        self.counts.update(dict(zip(*np.unique(status, return_counts=True), strict=True)))
+        for i in np.flatnonzero(status == records.FAILED):
+            given = (bodies[i], commands[i], states[i], sides[i : i + 1])
+            self.failures.append(np.concatenate(given))
+        return outcomes
+
+    def visit_edges(self) -> int:
+        """Bisect between new walkers and others next to them whose steps end otherwise; return between how many."""
+        self._draw(np.ones(self._n, dtype=bool))
+        rng, near = self._rng, self._states
+        share = rng.uniform(-0.3, 0.3, near.shape) * 10.0 ** rng.uniform(-1.0, 0.0, (self._n, 1))
+        far = near * (1.0 + share)
+        given = (self._bodies, draw_commands(rng, self._before), self._sides)
+        ends = [self._ends(given, states) for states in (near, far)]
+        steps = (ends[0][:, 0] == records.STEPPED) | (ends[1][:, 0] == records.STEPPED)
+        apart = (ends[0][:, 0] != ends[1][:, 0]) | (np.abs(ends[0][:, 1] - ends[1][:, 1]) > 0.3)
+        edges = np.flatnonzero(steps & apart)
+        near, far = near[edges], far[edges]
+        at_near, at_far = ends[0][edges], ends[1][edges]
+        given = (given[0][edges], given[1][edges], given[2][edges])
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (near + far)
+            at_middle = self._ends(given, middle)
+            is_nearer = np.abs(at_middle[:, 1] - at_near[:, 1]) <= np.abs(
+                at_middle[:, 1] - at_far[:, 1]
+            )
+            as_near = np.where(
+                at_near[:, 0] == at_far[:, 0], is_nearer, at_middle[:, 0] == at_near[:, 0]
+            )
+            near[as_near], at_near[as_near] = middle[as_near], at_middle[as_near]
+            far[~as_near], at_far[~as_near] = middle[~as_near], at_middle[~as_near]
+        return len(edges)
+
+    def _ends(self, given: tuple[Vector, Vector, Vector], states: Vector) -> Vector:
+        """How steps of walkers (bodies, commands, sides) end, and when (n, 2)."""
+        bodies, commands, sides = given
+        return self._outcomes(bodies, commands, states, sides)[:, [_STATUS, _DURATION]]
+
     def step(self) -> None:
         """One step of every walker."""
         rng, n = self._rng, self._n
         commands = draw_commands(rng, self._before)
-        outcomes = np.empty((n, len(Outcome._fields)))
-        step_batch(self._bodies, commands, self._states, self._sides, outcomes, 0, n)
+        outcomes = self._outcomes(self._bodies, commands, self._states, self._sides)
         status = outcomes[:, _STATUS]
-        self.counts.update(dict(zip(*np.unique(status, return_counts=True), strict=True)))
-        for i in np.flatnonzero(status == records.FAILED):
-            given = (self._bodies[i], commands[i], self._states[i], self._sides[i : i + 1])
-            self.failures.append(np.concatenate(given))
         self._states = outcomes[:, :STATE_SIZE].copy()
         pushes = rng.standard_normal((n, 2)) * [PITCH_PUSH, ANKLE_PUSH]
         self._states[:, 3:] += self._levels[:, None] * pushes
@@ -159,6 +202,9 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=60.0, help="how long to go on")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument(
+        "--edges", action="store_true", help="bisect between steps that end differently"
+    )
+    parser.add_argument(
         "--reproduce", metavar="NUMBER", nargs="+", help="a failure's numbers: step them once"
     )
     given = parser.parse_args()
@@ -167,14 +213,17 @@ def main() -> int:
         return 0
     seconds = require_number("--seconds", given.seconds, 0.0, 1e7, "(]")
     fuzz = Fuzz(require_count("--seed", given.seed, 0))
-    fuzz.step()
+    work, edges = fuzz.visit_edges if given.edges else fuzz.step, 0
+    work()
     began = time.perf_counter()
     before = sum(fuzz.counts.values())
     while time.perf_counter() - began < seconds:
-        fuzz.step()
+        edges += work() or 0
     spent = time.perf_counter() - began
     total = sum(fuzz.counts.values())
     print(f"{total:,} steps, {(total - before) / spent:,.0f} a second")
+    if given.edges:
+        print(f"{edges:,} edges, each bisected to neighbouring numbers")
     for status, count in sorted(fuzz.counts.items()):
         print(f"{NAMES[status]:>15} {count:>14,}")
     for row in fuzz.failures[:100]:

@@ -136,7 +136,7 @@ def test_tasks_and_agents_may_be_repeated_or_separated_by_commas():
         (["--agents", "nobody"], "agent must be one of"),
         (["--agents", "fixed", "--episodes", "0"], "episodes must be from"),
         (["--agents", "fixed", "--seed", "-1"], "seed must be from"),
-        (["--agents", "ppo", "--agent-path", "nowhere"], "there is no file"),
+        (["--agents", "ppo", "--agent-path", "nowhere"], "--agent-path"),
     ],
 )
 def test_the_command_line_refuses_bad_values_by_name(arguments, message):

@@ -260,9 +260,9 @@ def test_agents_of_the_package_are_found_by_id_algorithm_and_seed(tmp_path, monk
     assert agents.load(ID, algorithm="sac").card.algorithm == "sac"
     for id_, choices, message in [
         (ID, {"seed": 5}, "no agent of the algorithm 'ppo' for LeanYaw/Heading-v0 with seed 5"),
-        (ID, {"algorithm": "sac", "seed": 3}, "no sac agent for LeanYaw/Heading-v0 with seed 3"),
+        (ID, {"algorithm": "sac", "seed": 3}, "'sac' for LeanYaw/Heading-v0 with seed 3"),
         (ID, {"algorithm": "../ppo"}, "algorithm must be a lower-case word"),
-        ("LeanYaw/Walk-v0", {}, "no ppo agent for LeanYaw/Walk-v0"),
+        ("LeanYaw/Walk-v0", {}, "no agent of the algorithm 'ppo' for LeanYaw/Walk-v0"),
         ("LeanYaw/Heading-v7", {}, "not LeanYaw/Heading-v7"),
     ]:
         with pytest.raises(agents.PolicyFileError, match=message):

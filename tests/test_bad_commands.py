@@ -33,17 +33,21 @@ AXIS = (
     "hip=0.1:0.2:3",
     "slope=nan",
 )
+PLOT = {"--plot": ("", "x.doc", "no/such/x.png")}
+OPTIONS = {"--option": ("", "mirror", "mirorr=true", "mirror=maybe", "slope=steep")}
 BODY = {
     "--hip-width": (*NUMBER, "-0.1", "3"),
     "--foot-radius": (*NUMBER, "-0.1", "1"),
     "--ankle-tilt": (*NUMBER, "0", "2"),
     "--slope": (*NUMBER, "0.6"),
+    **PLOT,
     "--ankle-stiffness": (*NUMBER, "-1"),
     "--ankle-damping": (*NUMBER, "-1"),
 }
 COMMAND = {"--inter-leg-angle": (*POSITIVE, "2"), "--mass-offset": (*NUMBER, "-1.1", "2")}
 SPEEDS = {"--speeds": ("", "x", "1:2", "2:1:3", "1:2:1", "nan")}
 TRAIN = {
+    **OPTIONS,
     "--task": (*TEXT, "heading"), "--seed": SEEDS, "--seeds": ("x", "4-2", "1.5", "-1", "0"), "--jobs": COUNT,
     "--algorithm": TEXT, "--steps": COUNT, "--episodes": COUNT, "--out": (), "--run": ("no-such-folder",), "--threads": COUNT,
 }  # fmt: skip
@@ -57,17 +61,18 @@ COMMANDS: dict[tuple[str, str], tuple[list[str], dict[str, tuple[str, ...]]]] = 
         ["stance_pitch=0.15", "ankle_angle=0", "--steps", "1"],
         {**COMMAND, "--steps": COUNT, "--out": PLACE, **BODY},
     ),
-    ("lean-yaw", "bicycle"): ([], SPEEDS),
+    ("lean-yaw", "bicycle"): ([], {**SPEEDS, **PLOT, "--parameters": ("no-such-file.json",)}),
     ("lean-yaw", "skateboard"): (
         [],
         {
             **{f"--{name}": POSITIVE for name in ("mass", "rider-height", "wheelbase", "gravity")},
-            "--steering-tilt": (*POSITIVE, "2"), "--spring-stiffness": (*NUMBER, "-1"), "--damping": (*NUMBER, "-1"), **SPEEDS,
+            "--steering-tilt": (*POSITIVE, "2"), "--spring-stiffness": (*NUMBER, "-1"), "--damping": (*NUMBER, "-1"), **SPEEDS, **PLOT,
         },
     ),
     ("lean-yaw", "play"): (["LeanYaw/Level-v0"], {"ENV_ID": ("no-such-name", "LeanYaw/Heading-v7"), "--speed": POSITIVE, "--seed": SEEDS}),
     ("lean-yaw", "view"): ([], {"--walk": ("no-such-file.json",), "--port": (*SEEDS, "99999")}),
     ("lean-yaw", "reproduce"): (["table1"], {"NAMES": TEXT, "--out": ()}),
+    ("lean-yaw", "findings"): ([], {"--out": ()}),
     ("agents", "train"): (SMALL, TRAIN),
     ("train.py", ""): (SMALL, TRAIN),
     ("agents", "tune"): (
@@ -97,7 +102,7 @@ COMMANDS: dict[tuple[str, str], tuple[list[str], dict[str, tuple[str, ...]]]] = 
         {
             "AGENT": ("no-such-name",), "--agents": ("no-such-name",), "--task": TEXT, "--episodes": COUNT, "--costly-episodes": COUNT,
             "--seed": SEEDS, "--agent-path": ("no-such-folder",), "--runs": (), "--cache": (), "--processes": COUNT, "--out": (),
-            "--pictures": (),
+            "--pictures": (), **OPTIONS, "--results": (), "--others": ("no-such-file.json",),
         },
     ),
     ("agents", "closed-loop"): (

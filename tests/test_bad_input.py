@@ -477,6 +477,11 @@ ROWS |= {
             "progress": FLAG,
         },
     ),
+    "map_cost": Row(
+        constant(analysis.map_cost),
+        {"walker": WALKER, "axes": {"slope": [0.01]}},
+        {**WALK_OF, "axes": AXES},
+    ),
     "stable_speeds": Row(
         constant(analysis.stable_speeds),
         {"walker": WALKER},
@@ -903,7 +908,7 @@ RESULTS = {
 INSIDE = {
     "fall_of", "formula", "normal", "step_passive_rows", "uniform",
     "Simulation", "CharacteristicPolynomial.derivative", "CharacteristicPolynomial.eigenvalue_rate", "ControlInterface", "ClosedLoopMap",
-    "Agent", "GoalFromWalker.forward", "Growing", "progress_bar", "Capture.share", "Body.ankle_rotation", "LegShape.axis_ends",
+    "Agent", "GoalFromWalker.forward", "Growing", "progress_bar", "require_memory", "Capture.share", "Body.ankle_rotation", "LegShape.axis_ends",
     "RealTime.reset", "RealTime.step", "SectionMap.step_commanded", "ActiveMap.step_commanded", "Task.measure", "SectionMap.image",
     *(f"{kind}.{name}" for kind in ("SectionMap", "ActiveMap", "PassiveMap") for name in ("linear_step", "results", "step_many")),
     "SectionMap.require_state",

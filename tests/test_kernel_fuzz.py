@@ -27,6 +27,12 @@ def test_every_random_step_ends_as_a_step_or_a_fall() -> None:
     assert sum(fuzz.counts.values()) == 8 * 4096
 
 
+def test_no_step_fails_between_two_that_end_differently() -> None:
+    fuzz = Fuzz(seed=4, walkers=4096)
+    assert fuzz.visit_edges() > 60
+    assert not fuzz.failures
+
+
 def test_all_bodies_drawn_are_allowed() -> None:
     rows = draw_bodies(np.random.default_rng(0), 2000)
     assert (bodies_of(rows) == rows).all()

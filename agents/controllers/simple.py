@@ -80,7 +80,8 @@ def _action_shape(
     if layout is not None:
         seen = layout.require(observation)
     elif isinstance(observation, Mapping):
-        seen = require_observation(observation.get("observation", observation))
+        own: Any = observation.get("observation", observation)
+        seen = require_observation(own)
     else:
         seen = require_observation(observation)
     return (*seen.shape[:-1], ACTION_SIZE)

@@ -153,13 +153,10 @@ class Disturbance:
 
     Attributes
     ----------
-    coordinate : str
     gait_value : float
         The coordinate in the gait.
-    largest : float
-        The change, in the coordinate's unit, with its sign; all smaller ones tried are survived.
-    relative : float
-        The same as a share of the gait's value: 2.0 is +200 %, -1.0 is -100 %.
+    largest, relative : float
+        The change, in the coordinate's unit, with its sign, and as a share of the gait's value: 2.0 is +200 %. All smaller ones tried are survived.
     is_limited : bool
         Whether a larger one makes it fall; otherwise ``largest`` is as far as was looked.
     fall : str
@@ -249,11 +246,9 @@ class LargestPushes:
     angles : shape (n,)
         rad; zero adds to the stance pitch rate (it is negative: slows the walker), a quarter turn to the ankle rate.
     sizes : shape (n,)
-        All smaller ones tried are survived; rad / time unit.
+        All smaller ones tried are survived, to the ``tolerance``; rad / time unit.
     is_limited : bool, shape (n,)
         Whether a larger one fells the walker; otherwise ``sizes`` is as far as was looked.
-    tolerance : float
-        To which sizes are known.
     """
 
     angles: Vector

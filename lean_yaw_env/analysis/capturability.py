@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from lean_yaw_env.analysis.active_map import ActiveMap
 from lean_yaw_env.analysis.attraction import require_centre, section_grid
 from lean_yaw_env.analysis.limit_cycle import find_limit_cycle
 from lean_yaw_env.analysis.many_walks import walk_many
@@ -55,8 +56,6 @@ _LEAVES = 65_536
 @dataclass(frozen=True)
 class Choices:
     """Commands to choose from at every step: each inter-leg angle with each mass offset.
-
-    The default spans what an action of the environments can command.
 
     Attributes
     ----------
@@ -111,6 +110,10 @@ class Choices:
         return replace(self, inter_leg_angles=angles, mass_offsets=offsets)
 
 
+ALL_ACTIONS = Choices()
+"""What an action of the environments can command."""
+
+
 @dataclass(frozen=True)
 class Capture:
     """How ``n`` states can be saved in at most ``N`` chosen steps.
@@ -135,7 +138,7 @@ class Capture:
 def capture(
     walker: WalkerOrMap,
     states: Vector,
-    choices: Choices | None = None,
+    choices: Choices = ALL_ACTIONS,
     *,
     most_steps: int = 2,
     settle_steps: int = 60,
@@ -151,12 +154,13 @@ def capture(
         The nominal controller with its walker: a constant command, or a map of a walker that a controller steers, such as ``ClosedLoopMap``.
     states : shape (n, k)
         On the left foot.
-    choices : Choices, optional
+    choices : Choices
         Commands to choose from.
     most_steps : int from 0 to 4
     settle_steps : int >= 1
         What the nominal controller must walk after the chosen steps.
     threads : int >= 1
+        Of a constant command only: other controllers need not be able to answer two questions at once.
     known : Capture, optional
         What was found with coarser choices, all of which are among these, and as many ``most_steps``; only fewer steps are looked for.
     inter_leg_angle, mass_offset : see ``find_limit_cycle``
@@ -173,16 +177,13 @@ def capture(
     require_count("settle_steps", settle_steps, 1, 1_000_000)
     require_count("threads", threads, 1, 1024)
     states = require_shape("states", states, (None, len(section_map.names)))
-    if known is not None and require_instance("known", known, Capture).plans.shape != (
-        len(states),
-        most_steps,
-        2,
-    ):
+    require_instance("choices", choices, Choices)
+    size = (len(states), most_steps, 2)
+    if known is not None and require_instance("known", known, Capture).plans.shape != size:
         raise ValueError(f"known must be of the same states and most_steps, got {known!r}")
-    chosen = Choices() if choices is None else require_instance("choices", choices, Choices)
-    search = _Search(section_map, chosen, chosen.commands, settle_steps)
+    search = _Search(section_map, choices, choices.commands, settle_steps)
     least = np.full(len(states), most_steps + 1)
-    plans = np.full((len(states), most_steps, 2), np.nan)
+    plans = np.full(size, np.nan)
     if known is not None:
         least[:], plans[:] = known.least_steps, known.plans
     carried = np.full(len(states), section_map.carried)
@@ -196,7 +197,7 @@ def capture(
                 least[some[saved]] = n
                 plans[some[saved], :n], plans[some[saved], n:] = found[saved], np.nan
 
-        share_out(work, waiting.size, threads)
+        share_out(work, waiting.size, threads if isinstance(section_map, ActiveMap) else 1)
     return Capture(least, plans)
 
 
@@ -268,7 +269,7 @@ class _Search:
 def refine_capture(
     walker: WalkerOrMap,
     states: Vector,
-    choices: Choices | None = None,
+    choices: Choices = ALL_ACTIONS,
     *,
     tolerance: float = 0.01,
     most_levels: int = 3,
@@ -282,7 +283,7 @@ def refine_capture(
     Parameters
     ----------
     walker, states, most_steps, settle_steps, threads, inter_leg_angle, mass_offset : see ``capture``
-    choices : Choices, optional
+    choices : Choices
         The coarsest.
     tolerance : float in [0, 1]
         Largest growth of a set, as a share of the states, that still counts as none.
@@ -296,26 +297,24 @@ def refine_capture(
     require_number("tolerance", tolerance, 0.0, 1.0)
     require_count("most_levels", most_levels, 1, 6)
     levels: list[tuple[Choices, Capture]] = []
-    chosen = Choices() if choices is None else require_instance("choices", choices, Choices)
+    require_instance("choices", choices, Choices)
     known = None
     for _ in range(most_levels):
         found = capture(
-            walker, states, chosen, most_steps=most_steps, settle_steps=settle_steps, threads=threads, known=known, **command
+            walker, states, choices, most_steps=most_steps, settle_steps=settle_steps, threads=threads, known=known, **command
         )  # fmt: skip
-        levels.append((chosen, found))
-        grown = [
-            0.0 if known is None else found.share(n) - known.share(n) for n in range(most_steps + 1)
-        ]
-        if known is not None and max(grown) <= tolerance:
+        levels.append((choices, found))
+        sizes = range(most_steps + 1)
+        if known and max(found.share(n) - known.share(n) for n in sizes) <= tolerance:
             break
-        chosen, known = chosen.finer(), found
+        choices, known = choices.finer(), found
     return levels
 
 
 def capture_map(
     walker: WalkerOrMap,
     axes: Mapping[str, Sequence[float] | Vector],
-    choices: Choices | None = None,
+    choices: Choices = ALL_ACTIONS,
     *,
     centre: Vector | None = None,
     most_steps: int = 2,
@@ -353,7 +352,7 @@ def capture_map(
         If the integrator fails.
     """
     section_map = section_map_of(walker, **command)
-    chosen = Choices() if choices is None else require_instance("choices", choices, Choices)
+    require_instance("choices", choices, Choices)
     require_count("most_steps", most_steps, 0, MOST_STEPS)
     require_count("settle_steps", settle_steps, 1, 1_000_000)
     require_count("threads", threads, 1, 1024)
@@ -367,8 +366,8 @@ def capture_map(
     result = {name: np.full(len(states), np.nan) for name in ("inter_leg_angle", "mass_offset")}
     result["least_steps"] = np.full(len(states), -1.0)
     question = {
-        **section_map.question(), "inter_leg_angles": chosen.inter_leg_angles.tolist(), "mass_offsets": chosen.mass_offsets.tolist(),
-        "largest_change": chosen.largest_change, "most_steps": most_steps, "settle_steps": settle_steps,
+        **section_map.question(), "inter_leg_angles": choices.inter_leg_angles.tolist(), "mass_offsets": choices.mass_offsets.tolist(),
+        "largest_change": choices.largest_change, "most_steps": most_steps, "settle_steps": settle_steps,
     }  # fmt: skip
     named = dict(zip(section_map.names, middle.round(12).tolist(), strict=True))
     growing = Growing(
@@ -383,7 +382,7 @@ def capture_map(
     with growing:
         for some in growing.chunks(result["least_steps"] < 0.0, _CHUNK * threads):
             found = capture(
-                section_map, states[some], chosen, most_steps=most_steps, settle_steps=settle_steps, threads=threads
+                section_map, states[some], choices, most_steps=most_steps, settle_steps=settle_steps, threads=threads
             )  # fmt: skip
             result["least_steps"][some] = found.least_steps
             if most_steps:

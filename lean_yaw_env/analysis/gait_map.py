@@ -287,14 +287,12 @@ def _spread(
             there = places.copy()
             there[axis] += step
             inside = (there[axis] >= 0) & (there[axis] < size)
-            points = np.ravel_multi_index(tuple(there[:, inside]), grid.shape)
+            points = np.asarray(np.ravel_multi_index(tuple(there[:, inside]), grid.shape))
             waits = values["status"][points] == NONE_FOUND
             points, sources = points[waits], fresh[inside][waits]
             for start in range(0, points.size, _CHUNK):
-                here, guesses = (
-                    points[start : start + _CHUNK],
-                    values["state"][sources[start : start + _CHUNK]],
-                )
+                part = slice(start, start + _CHUNK)
+                here, guesses = points[part], values["state"][sources[part]]
                 rows = gaits_at(grid.section_map, grid.points(here), guesses, threads)
                 good = rows["status"] == FOUND
                 for name, column in rows.items():

@@ -109,24 +109,10 @@ def progress_bar(name: str, shown: bool, total: int | None = None) -> Any:
 class Growing:
     """Columns over the points of a grid that grow: counted, saved now and then, and when the work is left, whatever ends it.
 
-    Where the file exists already, what an earlier run has done is read into the columns.
-
-    Parameters
-    ----------
-    name : what the work is called
-    axes : by name, their values
-    columns : by name, arrays (n, ...) over all points, in row-major order
-    question : what identifies the columns, as plain values
-    path : file name, or None to keep nothing
-    progress : whether to show a bar
-    dimensions : by a column's name, its dimension beside the axes
-    coords, attrs : of the dataset, beside axes and question
-    notes : by a column's name, its attributes
-
-    Raises
-    ------
-    ValueError
-        If the file holds the results of another question.
+    ``columns`` are arrays (n, ...) over all points, in row-major order of the ``axes``; ``dimensions`` names, by column, the dimension beside
+    these. ``question`` identifies the columns, as plain values. Where the file exists already, what an earlier run has done is read into the
+    columns, or ``ValueError`` raised if it answers another question. ``coords`` and ``attrs`` are the dataset's further ones, ``notes`` the
+    attributes of its columns.
     """
 
     def __init__(

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -69,11 +69,6 @@ class Printed:
     @property
     def value(self) -> float:
         return float(self.printed)
-
-    @property
-    def decimals(self) -> int:
-        """Digits behind the point."""
-        return len(self.printed.partition(".")[2])
 
 
 @cache
@@ -145,42 +140,27 @@ class Check:
 
 
 def compare(row: Printed | str, ours: float, *, remark: str = "", otherwise: str = "") -> Check:
-    """Compare a number with the printed one.
+    """Compare a number, in the paper's unit, with the printed one or that of a name; nan is none found.
 
-    Parameters
-    ----------
-    row : Printed or str
-        The printed number, or its name.
-    ours : float
-        In the paper's unit; nan where we find none.
-    remark, otherwise : str
-        In place of the row's.
-
-    Raises
-    ------
-    ValueError
-        If the row has a tolerance without a reason, or the other way round.
+    ``remark`` and ``otherwise`` take the place of the row's. Raises ``ValueError`` if the row has a tolerance without a reason, or the
+    other way round.
     """
     row = printed(row) if isinstance(row, str) else row
     ours = float(ours)
     if (row.tolerance is None) != (not row.allowed):
         raise ValueError(f"number {row.name!r} needs a reason for its tolerance, and no other")
-    room = 0.5 * 10.0**-row.decimals if row.tolerance is None else row.tolerance
+    decimals = len(row.printed.partition(".")[2])
+    room = 0.5 * 10.0**-decimals if row.tolerance is None else row.tolerance
     difference = ours - row.value
-    verdict: Verdict = "open" if row.is_open else "differs"
+    agreed: Verdict | None = None
     if abs(difference) <= room * (1.0 + _ROUND_OFF) + _ROUND_OFF**2:
-        verdict = "agrees within rounding" if row.tolerance is None else "agrees"
+        agreed = "agrees within rounding" if row.tolerance is None else "agrees"
+    allowed = f"± {room:.2g}: {row.allowed or 'half of the last printed digit'}"
     both = f"The paper has {row.printed}, we find {ours:.5g}."
-    none = math.isnan(ours)
-    return _check(
-        row,
-        "none found" if none else significant(ours, row.decimals),
-        None if none else difference,
-        f"± {room:.2g}: {row.allowed or 'half of the last printed digit'}",
-        verdict,
-        remark,
-        otherwise or row.otherwise or both,
-    )
+    sentences = (remark or row.remark, otherwise or row.otherwise or both)
+    if math.isnan(ours):
+        return _check(row, agreed, "none found", None, allowed, *sentences)
+    return _check(row, agreed, significant(ours, decimals), difference, allowed, *sentences)
 
 
 def compare_all(beginning: str, ours: Iterable[float], *, otherwise: str = "") -> list[Check]:
@@ -192,46 +172,24 @@ def compare_all(beginning: str, ours: Iterable[float], *, otherwise: str = "") -
 def assess(
     row: Printed | str, holds: bool, ours: str, *, remark: str = "", otherwise: str = ""
 ) -> Check:
-    """Say whether a printed statement holds.
+    """Say whether a printed statement, or that of a name, holds; ``ours`` is what we find, with its numbers.
 
-    Parameters
-    ----------
-    row : Printed or str
-        The statement, or its name.
-    holds : bool
-    ours : str
-        What we find, with its numbers.
-    remark, otherwise : str
-        In place of the row's.
+    ``remark`` and ``otherwise`` take the place of the row's.
     """
     row = printed(row) if isinstance(row, str) else row
-    fallback = "" if remark or row.remark else "It does not hold."
-    verdict: Verdict = "agrees" if holds else "open" if row.is_open else "differs"
-    return _check(
-        row, ours, None, row.allowed, verdict, remark, otherwise or row.otherwise or fallback
-    )
+    always = remark or row.remark
+    fallback = otherwise or row.otherwise or ("" if always else "It does not hold.")
+    return _check(row, "agrees" if holds else None, ours, None, row.allowed, always, fallback)
 
 
 def _check(
-    row: Printed,
-    ours: str,
-    difference: float | None,
-    allowed: str,
-    verdict: Verdict,
-    remark: str,
-    otherwise: str,
-) -> Check:
-    sentences = [remark or row.remark, otherwise if verdict in ("differs", "open") else ""]
+    row: Printed, agreed: Verdict | None, ours: str, difference: float | None, allowed: str,
+    always: str, otherwise: str,
+) -> Check:  # fmt: skip
+    verdict: Verdict = agreed or ("open" if row.is_open else "differs")
+    remark = " ".join(filter(None, (always, "" if agreed else otherwise)))
     return Check(
-        row.name,
-        row.where,
-        row.meaning,
-        row.printed,
-        ours,
-        difference,
-        allowed,
-        verdict,
-        " ".join(filter(None, sentences)),
+        row.name, row.where, row.meaning, row.printed, ours, difference, allowed, verdict, remark
     )
 
 
@@ -273,7 +231,7 @@ class Result:
     sections : sequence of Section
     """
 
-    checks: Iterable[Check] = ()
+    checks: Sequence[Check] = ()
     tables: Mapping[str, Columns] = field(default_factory=dict)
     picture: Callable[[Path], None] | None = None
     sections: tuple[Section, ...] = ()

@@ -68,7 +68,8 @@ def draw_footprints(
         If there are not as many axes as walks, or no walks.
     """
     _require_walks(walks, foot_radius)
-    if np.size(places):  # none, where no episode has goals
+    is_empty = places.size == 0 if isinstance(places, np.ndarray) else places in ((), [])
+    if not is_empty:
         require_numbers("places", places, 2)
     axes = list(np.ravel(np.asarray(axes, dtype=object)))
     if not walks or len(axes) != len(walks):

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from lean_yaw_env.viewer.server import PAGE, require_built
 
-_KINDS = {"wasm": "application/wasm", "js": "text/javascript", "css": "text/css"}
+_TEXTS = {".js": "text/javascript", ".css": "text/css"}
 # The page's files become blobs, first those that others name. Then the page itself takes this document's place, and is given the walk.
 _DOCUMENT = """<!doctype html>
 <meta charset="utf-8" />
@@ -26,7 +26,7 @@ const withBlobs = (text) => blobs.reduce((so, [name, blob]) => so
   .replace("./assets/" + name, blob), text);
 for (const [name, type, packed] of %(files)s) {
   const content = unpacked(packed);
-  const part = type === "application/wasm" ? await content.arrayBuffer() : withBlobs(await content.text());
+  const part = type ? withBlobs(await content.text()) : await content.arrayBuffer();
   blobs.push([name, URL.createObjectURL(new Blob([part], { type }))]);
 }
 const page = withBlobs(await unpacked(%(page)s).text());
@@ -68,11 +68,11 @@ class PageDisplay:
             If there is no built page.
         """
         require_built()
-        # The kernel is named by the worker, and both are by the page's script
+        # Scripts name binary files; the page's own script names the worker too, and comes last
         files = sorted(
-            (PAGE / "assets").iterdir(), key=lambda file: (file.suffix != ".wasm", "index" in file.name)
+            (PAGE / "assets").iterdir(), key=lambda file: (file.suffix in _TEXTS, "index" in file.name)
         )  # fmt: skip
-        packed = [[file.name, _KINDS[file.suffix[1:]], _packed(file)] for file in files]
+        packed = [[file.name, _TEXTS.get(file.suffix, ""), _packed(file)] for file in files]
         return _DOCUMENT % {
             "files": json.dumps(packed),
             "page": json.dumps(_packed(PAGE / "index.html")),
