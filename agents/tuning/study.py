@@ -41,6 +41,8 @@ _WAITING_REPORTS = 5  # of each
 _AS_THEY_ARE = "as_they_are"
 """Marks the trial of the settings that come with the package."""
 _PROCESS = "process"
+_TABLES = ("stud", "trial", "version_info", "alembic")
+"""How names of Optuna's tables begin."""
 _AGAIN = "again"
 _VALUES = "enqueued"
 """Mark the trial that tries an unfinished one again, by the number and the values of that one."""
@@ -214,9 +216,15 @@ def _require_study_file(storage: Path, name: str) -> None:
     if not storage.exists():
         return
     try:
-        with contextlib.closing(
-            sqlite3.connect(f"{storage.absolute().as_uri()}?mode=ro", uri=True)
-        ) as file:
+        # to be written, since SQLite may have to undo what a killed process was writing; nothing else is changed
+        place = f"{storage.absolute().as_uri()}?mode=rw"
+        with contextlib.closing(sqlite3.connect(place, uri=True)) as file:
+            tables = [
+                row[0]
+                for row in file.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
+            ]
+            if all(table.startswith(_TABLES) for table in tables) and "studies" not in tables:
+                return  # a process was killed while it made the file
             names = [row[0] for row in file.execute("SELECT study_name FROM studies")]
     except sqlite3.Error as error:
         raise ValueError(
