@@ -115,6 +115,22 @@ def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, monkeypatch):
     assert continued.policy.card.training["steps"] == TINY.steps
 
 
+def test_a_training_interrupted_before_its_first_update_resumes_bit_for_bit(tmp_path, monkeypatch):
+    whole = train_agent("ppo", ID, TINY, seed=3, options=SHORT, progress=False)
+    arguments = {"seed": 3, "options": SHORT, "checkpoint": tmp_path / "c.safetensors", "checkpoint_seconds": 0.0, "progress": False}  # fmt: skip
+
+    def interrupted(self) -> bool:
+        raise Interruption
+
+    with monkeypatch.context() as patch:
+        patch.setattr(stable_baselines._Callback, "_on_step", interrupted)
+        with pytest.raises(Interruption):
+            train_agent("ppo", ID, TINY, **arguments)
+    continued = train_agent("ppo", ID, TINY, **arguments)
+    for name, weight in whole.policy.weights.items():
+        assert np.array_equal(weight, continued.policy.weights[name]), name
+
+
 def test_seeds_decide_a_training_and_different_ones_differ():
     small = PPOSettings(steps=256, walkers=8, steps_per_update=32, batch_size=128, epochs=1)
     one, same, other = (

@@ -254,7 +254,9 @@ class Recorder:
         self._bar.update(done - self._bar.n)
         if self._report is not None:
             self._report(done, recent)
-        if self._checkpoint and (last or time.monotonic() - self._written >= self._pause):
+        is_due = last or time.monotonic() - self._written >= self._pause
+        # before the first step there is nothing to keep, and resumed walkers would be reset once more
+        if self._checkpoint and steps and is_due:
             write_checkpoint(self._checkpoint, {**self._capture(), "log": vars(self.log())})
             self._written = time.monotonic()
 

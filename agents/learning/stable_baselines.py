@@ -79,7 +79,7 @@ class StableBaselinesLearner:
         threads: int,
         tensorboard: Path | None,
     ) -> None:
-        self._first = training_seed(seed)
+        first = training_seed(seed)
         self.options = options
         self._total, self._depth = settings.steps, len(settings.hidden)
         walking = vars(settings.training_options(options))
@@ -95,7 +95,7 @@ class StableBaselinesLearner:
             seed=seed,
             device="cpu",
         )
-        self._walkers.seed(self._first)  # in place of the policy's seed, which SB3 gives them too
+        self._walkers.seed(first)  # in place of the policy's seed, which SB3 gives them too
         # what SB3 has from the first step on, so that a state has the same parts before it
         self.model._last_obs = self.model._last_original_obs = self._no_observations()
         self.model._last_episode_starts = np.ones(settings.walkers, dtype=np.bool_)
@@ -178,9 +178,6 @@ class StableBaselinesLearner:
         """Bring the model to a captured state."""
         model = self.model
         self._walkers.reset()
-        self._walkers.seed(
-            self._first
-        )  # a training that is resumed before its first step resets them again
         require_like(self.capture(), state)
         restore({"policy": model.policy}, self.optimizers, state)
         for name, moments in self._moments().items():

@@ -23,7 +23,9 @@ KILLS = 20
 def killed(kind: str, folder: Path) -> int:
     """Begin the work and kill it, ``KILLS`` times, at moments over all that it takes; how often it was killed before its end."""
     moments = random.Random(kind)
-    start(work.leftovers, folder).join()  # begins the server, which imports everything
+    start(
+        work.go_on, kind, folder / "warm"
+    ).join()  # begins the server, which imports everything, and compiles
     began = time.monotonic()
     whole = start(work.go_on, kind, folder / "whole", log=folder / "log")
     whole.join()
@@ -44,7 +46,7 @@ def killed(kind: str, folder: Path) -> int:
 
 @pytest.fixture
 def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
-    for name in ("whole", "killed"):
+    for name in ("warm", "whole", "killed"):
         (tmp_path / name).mkdir()
         work.begin(request.node.callspec.params["kind"], tmp_path / name)
     return tmp_path
