@@ -23,6 +23,10 @@ from lean_yaw_env.kernel.flight import (
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+RUN_ELSEWHERE = {
+    "other_libraries": "its programs need other libraries: tests/compat runs them",
+    "enter_your_agent": "it trains for long: test_agents_entries runs it with a short training",
+}
 PYTHON_BLOCK = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 FENCED = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
@@ -53,8 +57,8 @@ def _anchors(page: Path) -> set[str]:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_the_code_of_a_page_runs_from_top_to_bottom(page: Path, tmp_path: Path) -> None:
-    if page.stem == "other_libraries":
-        pytest.skip("its programs need other libraries: tests/compat runs them")
+    if page.stem in RUN_ELSEWHERE:
+        pytest.skip(RUN_ELSEWHERE[page.stem])
     program = _program(page.read_text(encoding="utf-8"))
     if not program.strip():
         pytest.skip("no code")
