@@ -108,6 +108,19 @@ def test_the_share_of_stable_bodies_grows_with_the_slope() -> None:
     assert shares == sorted(shares)
 
 
+@pytest.mark.parametrize("slope", findings.BODY_SLOPES)
+@pytest.mark.parametrize("tilt", [0.12, 0.14])
+def test_below_the_least_tilt_each_step_turns_a_lean_into_a_greater_one_to_the_other_side(
+    slope: float, tilt: float
+) -> None:
+    body = replace(Walker().parameters, hip_width=0.05, ankle_tilt=tilt, slope=slope, slope_turns=True)  # fmt: skip
+    walker = Walker(body)
+    gait = find_limit_cycle(walker).state
+    leaning = gait + 1e-6 * np.eye(5)[2]
+    lean = (walker.walk(8, state=leaning).states - walker.walk(8, state=gait).states)[2:, 2]
+    assert np.all(lean[1:] / lean[:-1] < -1.05)
+
+
 # --- what chosen steps can save
 
 
@@ -132,11 +145,16 @@ def test_a_third_chosen_step_saves_as_many_as_the_page_says() -> None:
     assert np.all(found.share(3) >= found.share(2))
 
 
-def test_the_sets_grow_with_the_commands_ever_less() -> None:
+def test_what_two_steps_save_grows_with_the_commands_ever_less() -> None:
     shares = [VALUES[f"resolution_{commands}_2"] for commands in (9, 25, 81)]
     assert shares == sorted(shares)
     assert shares[2] - shares[1] < 0.02 < shares[1] - shares[0]
     assert Choices().commands.shape[0] == 35
+
+
+def test_what_one_step_saves_still_grows_with_the_commands() -> None:
+    shares = [VALUES[f"resolution_{commands}_1"] for commands in (9, 25, 81)]
+    assert shares[0] < shares[1] < shares[2]
 
 
 # --- what learned policies save
