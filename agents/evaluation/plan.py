@@ -30,7 +30,6 @@ from ..agent import Agent
 from ..policies.policy import package_versions
 from ..policies.policy_files import CARD_FILE, WEIGHTS_FILE, load, options_to_plain
 from ..registry import (
-    AGENTS,
     AgentRequest,
     agent_entry,
     env_id_of,
@@ -39,6 +38,7 @@ from ..registry import (
     policy_folders,
 )
 from ..seeds import MOST_EPISODES, EpisodeSet, first_seed
+from .comparison import kind_of
 from .entries import is_entry, load_entry, read_entry
 from .episodes import Episodes, Results
 from .scoring import run_seeds
@@ -195,7 +195,7 @@ class Evaluation:
 
 
 def _plans(agent: str) -> bool:
-    return agent in AGENTS and AGENTS[agent].kind == "planner"
+    return kind_of(agent) == "planner"
 
 
 def _gathered(
