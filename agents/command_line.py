@@ -324,8 +324,6 @@ def closed_loop(
     from .evaluation.closed_loop_report import examine_all, plain
 
     names = names_in([agents])
-    if not names:
-        raise ValueError(f"agents must name one or more, got {agents!r}")
     reports, notes = examine_all(
         tasks_in(task or ["Heading"]), names,
         path=agent_path, runs=runs, points=points, starts=starts, directions=directions,
