@@ -91,7 +91,7 @@ class _Chunk:
             "seeds": [self.seeds.start, self.seeds.stop],
             "policy": _policy_digest(candidate.entry, self.folder),
             "code": _code_digest(),
-            "versions": package_versions(),
+            "versions": _versions(),
         }
         digest = hashlib.sha256(json.dumps(depends, sort_keys=True).encode()).hexdigest()
         return cache / f"{candidate.task}-{candidate.agent}-{digest[:24]}.npz"
@@ -287,6 +287,10 @@ def _read(path: Path) -> _Outcome | None:
             return Episodes(kept["survived"], metrics), float(kept["seconds"])
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
         return None
+
+
+_versions = lru_cache(maxsize=1)(package_versions)
+"""They are read from the disk, which takes longer than all else in a chunk's name."""
 
 
 @lru_cache(maxsize=1)
