@@ -200,7 +200,6 @@ def evaluate(
     --agent-path is the folder of a run, or of an agent of your own: see docs/enter_your_agent.md.
     """
     from .evaluation.comparison import by_task, compared_rows, rivals_of
-    from .evaluation.leaderboard import make_leaderboard, save_footprints
     from .evaluation.plan import Evaluation
     from .evaluation.results_files import read_results, write_results
     from .evaluation.row_tables import show
@@ -229,6 +228,8 @@ def evaluate(
         keep(f"finished episodes are in {evaluation.cache}; {AGAIN}")
     candidates = evaluation.candidates(tasks, [] if ALL in given else given)
     if pictures is not None:
+        from .evaluation.leaderboard import save_footprints
+
         save_footprints(candidates, pictures, seed=seed)
         return
     if out is None:
@@ -236,6 +237,8 @@ def evaluate(
         compared = by_task(found)
         rows, _ = compared_rows(compared, rivals_of(compared), evaluation.processes)
     else:
+        from .evaluation.leaderboard import make_leaderboard
+
         entered = [read_results(file, "test", seed) for file in others or ()]
         rows, found = make_leaderboard(candidates, evaluation, out, command_as_typed(), entered)
     if results is not None:
