@@ -70,14 +70,14 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_bytes(text.encode("utf-8"))
 
 
-def write_json(path: Path, value: Any) -> None:
+def write_json(path: Path, value: Any, *, indent: int | None = 2) -> None:
     """Write a value as ``json_text`` has it."""
-    write_text(path, json_text(value))
+    write_text(path, json_text(value, indent=indent))
 
 
-def json_text(value: Any) -> str:
-    """A value as JSON that every reader of JSON takes; infinite numbers become the strings "inf" and "-inf"."""
-    return json.dumps(_plain(value), indent=2, allow_nan=False) + "\n"
+def json_text(value: Any, *, indent: int | None = 2) -> str:
+    """A value as JSON that every reader of JSON takes, in one line without ``indent``; infinite numbers become the strings "inf" and "-inf"."""
+    return json.dumps(_plain(value), indent=indent, allow_nan=False) + "\n"
 
 
 def read_json(path: Path) -> Any:
