@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,6 +33,7 @@ from ..agent import Agent
 from ..registry import AgentRequest, env_id_of, make_agent
 from .closed_loop_interface import closed_loop
 from .closed_loop_report import axes_around_start, box_starts
+from .row_tables import IMAGES, csv_table
 
 MOST_STEPS, SETTLE_STEPS = 2, 60
 """Chosen steps of the exhaustive search, and steps that the paper's controller then walks; an agent walks as many in all."""
@@ -184,16 +183,13 @@ def examine_captures(
 
 def write_captures(reports: Sequence[CaptureReport], out: Path) -> list[Path]:
     """Write capture.csv and a picture for each task and friction limit into a folder; return the paths."""
-    (out / "images").mkdir(parents=True, exist_ok=True)
-    text = io.StringIO()
-    writer: csv.DictWriter[str] = csv.DictWriter(text, COLUMNS)
-    writer.writeheader()
-    writer.writerows(row for report in reports for row in report.rows())
-    write_text(out / "capture.csv", text.getvalue())
+    (out / IMAGES).mkdir(parents=True, exist_ok=True)
+    rows = ([row[name] for name in COLUMNS] for report in reports for row in report.rows())
+    write_text(out / "capture.csv", csv_table(COLUMNS, rows))
     paths = [out / "capture.csv"]
     for task, limit in dict.fromkeys((report.task, report.friction_limit) for report in reports):
         floor = "" if limit == float("inf") else f"_friction_{limit:g}"
-        paths.append(out / "images" / f"capture_{task.lower()}{floor}.png")
+        paths.append(out / IMAGES / f"capture_{task.lower()}{floor}.png")
         these = [each for each in reports if (each.task, each.friction_limit) == (task, limit)]
         save_capture(these, paths[-1])
     return paths

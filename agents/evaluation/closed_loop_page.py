@@ -17,10 +17,8 @@ from lean_yaw_env.files import write_text
 from .closed_loop_interface import GOAL_AHEAD
 from .closed_loop_pictures import save_basins, save_eigenvalues, save_pushes
 from .closed_loop_report import LINES, REACHES, STEPS, ZERO, Cell, ClosedLoopReport
-from .row_tables import csv_table, markdown_table
+from .row_tables import IMAGES, csv_table, markdown_table
 
-IMAGES = "images"
-"""Folder of the pictures beside the page."""
 _HEAD = """# Walker and agent as one system
 
 The leaderboard says how good an agent is, but not why. With the command held constant, walker and agent together are one dynamical system. From heel strike

@@ -20,14 +20,13 @@ from ..policies.policy import package_versions
 from ..registry import AGENTS
 from ..seeds import first_seed
 from .capture import MOST_STEPS, examine_capture
-from .comparison import ENTERED, Claim, best_feedback, by_task, compared_rows, kind_of
+from .comparison import ENTERED, Claim, by_task, compared_rows, kind_of, rivals_of
 from .episodes import SURVIVAL, Results, Row, direction, is_share, metric_row
 from .intervals import CLAIM_RESAMPLES, CONFIDENCE, RESAMPLES
 from .pictures import save_agents_footprints, save_leaderboard_plot, save_push_levels_plot
 from .plan import Candidate, Evaluation, make_candidate
-from .row_tables import bracketed, iqm, markdown_table, mean, rows_to_csv
+from .row_tables import IMAGES, bracketed, csv_table, iqm, markdown_table, mean, rows_to_csv
 
-IMAGES = "images"
 LEVELS_TASK, LEVELS_METRIC = "Push", "survived_200_steps"
 """What is evaluated at other push levels too, by which metric."""
 LEVELS = (0.2, 0.4, 0.6, 0.8, 1.0)
@@ -132,8 +131,7 @@ def saved_shares(candidates: Sequence[Candidate], evaluation: Evaluation, starts
 def fixed_rivals(candidates: Sequence[Candidate], evaluation: Evaluation) -> dict[str, str | None]:
     """The feedback controller that each task's agents are compared with: the best one on the validation episodes."""
     controllers = [each for each in candidates if kind_of(each.agent) == "feedback"]
-    found = by_task(replace(evaluation, episode_set="validation").run(controllers))
-    return {task: best_feedback(results) for task, results in found.items()}
+    return rivals_of(by_task(replace(evaluation, episode_set="validation").run(controllers)))
 
 
 def level_candidates(
@@ -179,13 +177,15 @@ def _machine() -> str:
 
 
 def _levels_to_csv(levels: Levels) -> str:
-    lines = ["level,agent,share,low,high,episodes,trainings"]
-    lines += [
-        f"{level:g},{row.agent},{row.mean!r},{row.low!r},{row.high!r},{row.episodes},{row.trainings}"
-        for level, rows in levels.items()
-        for row in rows
-    ]
-    return "\n".join(lines) + "\n"
+    titles = ("level", "agent", "share", "low", "high", "episodes", "trainings")
+    return csv_table(
+        titles,
+        (
+            (f"{level:g}", row.agent, row.mean, row.low, row.high, row.episodes, row.trainings)
+            for level, rows in levels.items()
+            for row in rows
+        ),
+    )
 
 
 def leaderboard_page(

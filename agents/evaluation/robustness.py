@@ -19,9 +19,8 @@ from lean_yaw_env.rendering.figures import new_figure, save_figure
 from ..policies.policy_files import options_to_plain
 from .comparison import kind_of
 from .episodes import Row, metric_row
-from .leaderboard import IMAGES
 from .plan import Candidate, Evaluation
-from .row_tables import bracketed, csv_table, markdown_table, mean, number
+from .row_tables import IMAGES, bracketed, csv_table, markdown_table, mean, number
 
 NOMINAL = "as it is"
 VARIATIONS: dict[str, Callable[[TaskOptions], Mapping[str, Any]]] = {

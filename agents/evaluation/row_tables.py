@@ -18,6 +18,8 @@ from lean_yaw_env.envs.tasks import task_named
 from .episodes import SURVIVAL, Row, is_share
 from .intervals import Estimate
 
+IMAGES = "images"
+"""Folder of a page's pictures, beside it."""
 _WIDTH = 5  # agents in a table: so many fit a terminal of 80 columns
 
 
