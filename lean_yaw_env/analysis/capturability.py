@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from lean_yaw_env.analysis.active_map import ActiveMap
 from lean_yaw_env.analysis.attraction import require_centre, section_grid
 from lean_yaw_env.analysis.limit_cycle import find_limit_cycle
-from lean_yaw_env.analysis.many_walks import walk_many
+from lean_yaw_env.analysis.many_walks import raise_for_failures, walk_many
 from lean_yaw_env.analysis.section_map import (
     CommandArguments,
     SectionMap,
@@ -28,8 +28,7 @@ from lean_yaw_env.analysis.section_map import (
     section_map_of,
 )
 from lean_yaw_env.analysis.storage import Growing
-from lean_yaw_env.errors import SolverError
-from lean_yaw_env.kernel.records import FAILED, STEPPED
+from lean_yaw_env.kernel.records import STEPPED
 from lean_yaw_env.parameters import Vector, require_inter_leg_angle, require_mass_offset
 from lean_yaw_env.threads import MOST_THREADS, share_out
 from lean_yaw_env.validation import (
@@ -255,12 +254,9 @@ class _Search:
         in_force = states[:, names.index("mass_offset")] if "mass_offset" in names else carried
         change, now = self.choices.largest_change, in_force[parents]
         asked[:, 1] = np.clip(asked[:, 1], now - change, now + change)
-        after, left, status = self.section_map.step_commanded(
-            states[parents], carried[parents], asked, foot
-        )
-        if (status == FAILED).any():
-            bad = parents[np.argmax(status == FAILED)]
-            raise SolverError(f"the step from {states[bad].tolist()} did not converge")
+        starts = states[parents]
+        after, left, status = self.section_map.step_commanded(starts, carried[parents], asked, foot)
+        raise_for_failures(status, starts)
         done = np.flatnonzero(status == STEPPED)
         won, rest = self.saved(after[done], left[done], 1 - foot, n - 1)
         is_saved = np.zeros((who.size, len(commands)), dtype=bool)
