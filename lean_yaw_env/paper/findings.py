@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import csv
-import io
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +21,7 @@ from lean_yaw_env.analysis import (
 )
 from lean_yaw_env.files import write_text
 from lean_yaw_env.paper.drawing import FAINT, STABLE_FACE, name_axes, picture_of
+from lean_yaw_env.paper.report import write_columns
 from lean_yaw_env.parameters import Vector, WalkerParameters
 from lean_yaw_env.rendering.figures import new_figure
 from lean_yaw_env.walker import Walker
@@ -305,11 +305,11 @@ def write_findings(folder: Path, *, size: float = 1.0, progress: bool = False) -
     """
     (folder / "images").mkdir(parents=True, exist_ok=True)
     found = compute(size=size, progress=progress)
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(("name", "value", "meaning"))
-    writer.writerows((name, value, meaning) for name, (value, meaning) in numbers(found).items())
-    write_text(folder / "findings.csv", text.getvalue())
+    rows = numbers(found)
+    values, meanings = zip(*rows.values(), strict=True)
+    write_columns(
+        folder / "findings.csv", {"name": list(rows), "value": values, "meaning": meanings}
+    )
     for name, draw in PICTURES.items():
         picture_of(draw(found))(folder / "images" / f"findings_{name}.png")
     write_text(folder / "findings.md", page(folder))
