@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import glob
 import json
 import math
 import os
@@ -104,7 +103,7 @@ def read_regular(path: Path, most: int) -> bytes:
     if status.st_size > most:
         raise OSError(f"{str(path)!r} has {status.st_size:,} bytes, and at most {most:,} are read")
     with path.open("rb") as file:
-        return file.read(most + 1)[:most]
+        return file.read(most)
 
 
 class BusyError(LeanYawError):
@@ -161,7 +160,7 @@ def _try_lock(descriptor: int) -> bool:
 
 def _remove_leftovers(folder: Path) -> None:
     """Remove partial files whose writers no longer run; those of other machines when they are older than any write takes."""
-    for left in folder.glob(f"{glob.escape(_PREFIX)}*"):
+    for left in folder.glob(f"{_PREFIX}*"):
         writer, _, rest = left.name.removeprefix(_PREFIX).partition("-")
         is_own = platform.node() in rest
         with contextlib.suppress(OSError):
