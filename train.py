@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.reporting import reporting
 
-with reporting("train"):
+with reporting("train"), needs_extra("train"):
     import typer
 
     from agents.command_line import train

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from json import dumps
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -17,6 +17,7 @@ import typer
 from rich.console import Console
 from typer import Argument, Option
 
+from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.registration import TASK_VERSIONS
 from lean_yaw_env.reporting import keep, reported
 
@@ -43,13 +44,17 @@ EnvOption = Annotated[
 AsJson = Annotated[bool, Option("--json", help="Print JSON instead of tables.")]
 
 
+def _command(name: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """A decorator that makes a function a command of the app, which reports its errors and what installs a library that it lacks."""
+    return lambda function: app.command(name)(reported(name)(needs_extra("train")(function)))
+
+
 @app.callback()
 def main() -> None:
     """Agents for the walking environments: evaluate, train, tune, ship, examine and film them."""
 
 
-@app.command()
-@reported("train")
+@_command("train")
 def train(
     task: Annotated[str, Option(help="The task's name, as in LeanYaw/<task>-v0.")] = "Heading",
     seed: Annotated[int | None, Option(help="Random seed; 0 by default.")] = None,
@@ -119,8 +124,7 @@ def _training_place(
     return new_series(task, parse_seeds(seeds), out, chosen)
 
 
-@app.command()
-@reported("tune")
+@_command("tune")
 def tune(
     agent: Annotated[str, Argument(help="feedback, lqr, mpc, ppo or sac.")],
     task: Annotated[str, Argument(help="The task's name.")],
@@ -158,8 +162,7 @@ def tune(
         typer.echo(f"  {name} = {value}")
 
 
-@app.command()
-@reported("ship")
+@_command("ship")
 def ship(
     sources: Annotated[list[Path], Argument(metavar="SOURCE...", help="Folders of finished runs or series of them, or files of best settings "
         "that tune left.")],
@@ -173,8 +176,7 @@ def ship(
             typer.echo(f"{source} -> {place}")
 
 
-@app.command()
-@reported("evaluate")
+@_command("evaluate")
 def evaluate(
     more_agents: Annotated[list[str] | None, Argument(metavar="[AGENT]...", help="More agents.")] = None,
     agents: Annotated[list[str] | None, Option(help="Agents to evaluate, one after the other or separated by commas: random, fixed, feedback, lqr, "
@@ -200,7 +202,6 @@ def evaluate(
     --agent-path is the folder of a run, or of an agent of your own: see docs/enter_your_agent.md.
     """
     from .evaluation.comparison import by_task, compared_rows, rivals_of
-    from .evaluation.leaderboard import make_leaderboard, save_footprints
     from .evaluation.plan import Evaluation
     from .evaluation.results_files import read_results, write_results
     from .evaluation.row_tables import show
@@ -229,6 +230,8 @@ def evaluate(
         keep(f"finished episodes are in {evaluation.cache}; {AGAIN}")
     candidates = evaluation.candidates(tasks, [] if ALL in given else given)
     if pictures is not None:
+        from .evaluation.leaderboard import save_footprints
+
         save_footprints(candidates, pictures, seed=seed)
         return
     if out is None:
@@ -236,6 +239,8 @@ def evaluate(
         compared = by_task(found)
         rows, _ = compared_rows(compared, rivals_of(compared), evaluation.processes)
     else:
+        from .evaluation.leaderboard import make_leaderboard
+
         entered = [read_results(file, "test", seed) for file in others or ()]
         rows, found = make_leaderboard(candidates, evaluation, out, command_as_typed(), entered)
     if results is not None:
@@ -272,8 +277,7 @@ def command_as_typed() -> str:
     return shlex.join(["python", "-m", str(__package__), *sys.argv[1:]])
 
 
-@app.command()
-@reported("robustness")
+@_command("robustness")
 def robustness(
     task: Tasks = None,
     agents: Annotated[str, Option(help="Agents, separated by commas, or all.")] = ALL,
@@ -305,8 +309,7 @@ def robustness(
     typer.echo(f"written: {write_robustness(rows, out, command_as_typed())}")
 
 
-@app.command("closed-loop")
-@reported("closed-loop")
+@_command("closed-loop")
 def closed_loop(
     task: Tasks = None,
     agents: Annotated[str, Option(help="Agents, separated by commas; those that remember or draw are refused. With several tasks, one that is not for a "
@@ -324,8 +327,6 @@ def closed_loop(
     from .evaluation.closed_loop_report import examine_all, plain
 
     names = names_in([agents])
-    if not names:
-        raise ValueError(f"agents must name one or more, got {agents!r}")
     reports, notes = examine_all(
         tasks_in(task or ["Heading"]), names,
         path=agent_path, runs=runs, points=points, starts=starts, directions=directions,
@@ -339,8 +340,7 @@ def closed_loop(
         typer.echo(f"written: {page}", err=True)
 
 
-@app.command("capture")
-@reported("capture")
+@_command("capture")
 def capture(
     task: Tasks = None,
     agents: Annotated[str, Option(help="Agents, separated by commas; those that plan, remember or draw are left out.")] = "fixed,feedback,lqr,ppo",
@@ -368,8 +368,7 @@ def capture(
         typer.echo(f"written: {path}", err=True)
 
 
-@app.command()
-@reported("film")
+@_command("film")
 def film(
     task: Annotated[str, Option(help="A task's name, or all.")] = ALL,
     agent: Annotated[str, Option(help="The agent. If it was not trained for a task, lqr is filmed instead.")] = "ppo",

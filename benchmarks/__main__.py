@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import asdict
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from benchmarks import environments, kernel, startup, training
 from benchmarks.compare import as_text as comparison_text
 from benchmarks.compare import compare, save_plot
 from benchmarks.measure import as_json, as_text, machine
-from lean_yaw_env.files import write_text
+from lean_yaw_env.files import write_json
 
 RESULTS = Path(__file__).parent / "results"
 
@@ -28,7 +27,7 @@ def main() -> None:
     print(comparison_text(speeds))
     kept = as_json(measurements) | {"comparison": [asdict(speed) for speed in speeds]}
     RESULTS.mkdir(exist_ok=True)
-    write_text(RESULTS / "full.json", json.dumps(kept, indent=2) + "\n")
+    write_json(RESULTS / "full.json", kept)
     save_plot(speeds, machine(), RESULTS / "comparison.png")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import glob
 import json
 import math
 import os
@@ -70,14 +69,14 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_bytes(text.encode("utf-8"))
 
 
-def write_json(path: Path, value: Any) -> None:
+def write_json(path: Path, value: Any, *, indent: int | None = 2) -> None:
     """Write a value as ``json_text`` has it."""
-    write_text(path, json_text(value))
+    write_text(path, json_text(value, indent=indent))
 
 
-def json_text(value: Any) -> str:
-    """A value as JSON that every reader of JSON takes; infinite numbers become the strings "inf" and "-inf"."""
-    return json.dumps(_plain(value), indent=2, allow_nan=False) + "\n"
+def json_text(value: Any, *, indent: int | None = 2) -> str:
+    """A value as JSON that every reader of JSON takes, in one line without ``indent``; infinite numbers become the strings "inf" and "-inf"."""
+    return json.dumps(_plain(value), indent=indent, allow_nan=False) + "\n"
 
 
 def read_json(path: Path) -> Any:
@@ -104,7 +103,7 @@ def read_regular(path: Path, most: int) -> bytes:
     if status.st_size > most:
         raise OSError(f"{str(path)!r} has {status.st_size:,} bytes, and at most {most:,} are read")
     with path.open("rb") as file:
-        return file.read(most + 1)[:most]
+        return file.read(most)
 
 
 class BusyError(LeanYawError):
@@ -161,7 +160,7 @@ def _try_lock(descriptor: int) -> bool:
 
 def _remove_leftovers(folder: Path) -> None:
     """Remove partial files whose writers no longer run; those of other machines when they are older than any write takes."""
-    for left in folder.glob(f"{glob.escape(_PREFIX)}*"):
+    for left in folder.glob(f"{_PREFIX}*"):
         writer, _, rest = left.name.removeprefix(_PREFIX).partition("-")
         is_own = platform.node() in rest
         with contextlib.suppress(OSError):

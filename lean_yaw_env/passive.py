@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,7 +37,7 @@ from lean_yaw_env.walker import (
     EnergyLedger,
     Fall,
     StepResult,
-    raise_for_failure,
+    failure_of,
     walk_arrays,
 )
 
@@ -142,9 +143,8 @@ class PassiveWalker:
             )
         row = step_passive_rows(self, start[None], [SIDE[foot]], [angle])[0]
         outcome = PassiveOutcome(*row.tolist())
-        raise_for_failure(
-            outcome.status, self.moving_parameters.body(), (angle,), start, SIDE[foot]
-        )
+        if outcome.status == records.FAILED:
+            raise failure_of(self.moving_parameters.body(), (angle,), start, SIDE[foot])
         if outcome.status == records.TRIP:
             raise ValueError(
                 f"state {start.tolist()} has no trailing swing foot on the floor: its stance_pitch "
@@ -236,6 +236,11 @@ class PassiveWalker:
         )
         return {name: rows[:, i].copy() for i, name in enumerate(MOTION_COLUMNS)}
 
+    @cached_property
+    def _body(self) -> Vector:
+        """The parameters that the motion depends on as the kernel's row."""
+        return np.array(self.moving_parameters.body())
+
 
 def require_passive_state(state: ArrayLike, *, planar: bool = False, name: str = "state") -> Vector:
     """Return a passive section state as float array (6,), or raise ``ValueError``."""
@@ -266,7 +271,7 @@ def step_passive_rows(
     n = len(states)
     results = np.empty((n, len(PassiveOutcome._fields)))
     passive_batch(
-        np.array([walker.moving_parameters.body()]),
+        walker._body[None],
         np.ascontiguousarray(states, dtype=float),
         np.asarray(inter_leg_angles, dtype=float),
         np.asarray(sides, dtype=float),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import re
 import subprocess
 import sys
@@ -20,7 +21,9 @@ from agents.evaluation.episodes import RETURN
 from agents.evaluation.plan import Evaluation
 from agents.evaluation.results_files import read_results, write_results
 from agents.evaluation.scoring import run_episodes
+from agents.policies.policy_files import options_from_plain
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.files import read_json
 
 PAGE = Path(__file__).parents[1] / "docs" / "enter_your_agent.md"
 RECORD = {
@@ -155,6 +158,14 @@ def test_a_results_file_holds_every_episode_bit_for_bit(folder: Path, tmp_path: 
     assert (again.task, again.agent, len(again.runs)) == ("Push", "still", 2)
     for metric in found.metrics:
         assert np.array_equal(again.values(metric), found.values(metric), equal_nan=True)
+
+
+def test_a_results_file_keeps_an_option_that_is_infinite(tmp_path: Path):
+    options = EnvOptions(friction_limit=math.inf, horizon=8.0)
+    evaluation = Evaluation(episodes=1, options=options, progress=False)
+    (found,) = evaluation.run(evaluation.candidates(["Walk"], ["fixed"]))
+    record = read_json(write_results(found, tmp_path, "validation", 0))
+    assert options_from_plain(record["options"]) == options
 
 
 @pytest.mark.parametrize(

@@ -298,20 +298,26 @@ def test_the_policy_taken_from_a_training_acts_as_the_trained_network(tmp_path):
 
 OTHERS = "cmaes matplotlib moviepy optuna PIL pygame rich safetensors stable_baselines3 sympy torch tqdm typer xarray"
 """Libraries of the package's extras."""
-CORE_ALONE = f"""
+WITHOUT = """
 import sys
 class Missing:
     def find_spec(name, path=None, target=None):
-        if name.partition(".")[0] in {OTHERS.split()!r}:
-            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+        if name.partition(".")[0] in LIBRARIES:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 sys.meta_path.insert(0, Missing)
 """
 
 
+def without(libraries: str, program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run a program as where some libraries are not installed."""
+    code = f"LIBRARIES = {libraries.split()!r}{WITHOUT}{program}"
+    command = [sys.executable, "-c", code, *arguments]
+    return subprocess.run(command, cwd=Path(__file__).parents[1], capture_output=True, text=True)
+
+
 def core_alone(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run a program as where only the core's dependencies are installed."""
-    command = [sys.executable, "-c", CORE_ALONE + program, *arguments]
-    return subprocess.run(command, cwd=Path(__file__).parents[1], capture_output=True, text=True)
+    return without(OTHERS, program, *arguments)
 
 
 def test_the_core_alone_runs_controllers_and_says_what_policies_need():
@@ -333,9 +339,23 @@ except ImportError as error:
     assert done.stdout.splitlines() == ["[ True]", "[ True]", hint]
 
 
-def test_the_command_line_says_what_it_needs():
-    program = "import runpy; runpy.run_module('agents', run_name='__main__')"
-    done = core_alone(program, "--help")
+@pytest.mark.parametrize(
+    ("name", "start"), [("agents", "run_module('agents'"), ("train", "run_path('train.py'")]
+)
+def test_the_command_line_says_what_it_needs(name, start):
+    done = core_alone(f"import runpy; runpy.{start}, run_name='__main__')", "--help")
     assert done.returncode == 1
-    hint = "agents: typer is not installed, run `pip install 'lean-yaw-env[train]'`"
+    hint = f"{name}: typer is not installed, run `pip install 'lean-yaw-env[train]'`"
+    assert done.stderr.strip() == hint
+
+
+@pytest.mark.parametrize(
+    ("library", "command"), [("torch", "train"), ("optuna", "tune feedback Heading")]
+)
+def test_a_command_says_what_installs_a_library_that_it_alone_needs(library, command):
+    program = "import runpy; runpy.run_module('agents', run_name='__main__')"
+    done = without(library, program, *command.split())
+    assert done.returncode == 1
+    name = command.split()[0]
+    hint = f"{name}: {library} is not installed, run `pip install 'lean-yaw-env[train]'`"
     assert done.stderr.strip() == hint

@@ -379,6 +379,9 @@ def test_a_large_map_says_what_it_costs_and_one_beyond_memory_is_refused(
     result = runner.invoke(app, ["map", "slope=0.005:0.05:4"])
     assert result.exit_code == 0
     assert "4 points: about" in result.output and "GB of memory and" in result.output
+    result = runner.invoke(app, ["map", "slope=0.005:0.05:4", "--threads", "0"])
+    assert result.exit_code == 2
+    assert "threads must be from 1 to 1024, got 0" in result.output
     result = runner.invoke(app, ["map", "slope=0.005:0.05:100000", "hip_width=0.1:0.5:100000"])
     assert result.exit_code == 2
     assert "10,000,000,000, which take about" in result.output

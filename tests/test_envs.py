@@ -601,6 +601,12 @@ def test_gymnasiums_play_steers_by_keys(monkeypatch: pytest.MonkeyPatch) -> None
     assert headings[-1] > headings[0] + 0.1  # to the left
 
 
+def test_in_real_time_there_is_nothing_to_draw_before_the_first_episode() -> None:
+    env = RealTime(WalkerEnv("Walk", render_mode="rgb_array"))
+    with pytest.raises(ResetNeeded):
+        env.render()
+
+
 def test_real_time_is_for_walkers_that_can_be_drawn() -> None:
     with pytest.raises(ValueError, match='render_mode="rgb_array"'):
         RealTime(gym.make("LeanYaw/Walk-v0"))

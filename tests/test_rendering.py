@@ -737,6 +737,21 @@ def test_titles_and_labels_of_footprints_are_inside_the_picture(walker, count):
         assert panel.get_xlim()[0] < -3.0
 
 
+@pytest.mark.parametrize(
+    "places", ["x", None, [[1.0, 2.0, 3.0]], [[math.nan, 0.0]], [[1.0, 2.0], [3.0]]]
+)
+def test_places_that_are_no_points_are_refused_by_name(walker, places):
+    with pytest.raises(ValueError, match="places must"):
+        footprint_figure({"walk": walker.walk(3, state=GAIT)}, places=places)
+
+
+@pytest.mark.parametrize("places", [(), [], np.empty((0, 2))])
+def test_no_places_change_nothing(walker, places):
+    walks = {"walk": walker.walk(3, state=GAIT)}
+    (panel,), (alone,) = (footprint_figure(walks, **each)[1] for each in ({"places": places}, {}))
+    assert (panel.get_xlim(), panel.get_ylim()) == (alone.get_xlim(), alone.get_ylim())
+
+
 def test_a_picture_of_footprints_is_written_whole(walker, tmp_path):
     walks = {"fixed": walker.walk(3, state=GAIT)}
     save_footprints(walks, tmp_path / "prints.png")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +17,8 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from lean_yaw_env.analysis import Choices, ClosedLoopMap, capture
+from lean_yaw_env.analysis import Choices, capture
+from lean_yaw_env.analysis.attraction import section_grid
 from lean_yaw_env.analysis.many_walks import walk_many
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
@@ -33,7 +32,8 @@ from lean_yaw_env.walker import Walker
 from ..agent import Agent
 from ..registry import AgentRequest, env_id_of, make_agent
 from .closed_loop_interface import closed_loop
-from .closed_loop_report import REACHES, box_starts
+from .closed_loop_report import axes_around_start, box_starts
+from .row_tables import IMAGES, csv_table
 
 MOST_STEPS, SETTLE_STEPS = 2, 60
 """Chosen steps of the exhaustive search, and steps that the paper's controller then walks; an agent walks as many in all."""
@@ -116,7 +116,7 @@ def examine_capture(
     require_count("points", points, 2, 2000)
     require_number("friction_limit", friction_limit, 0.0, float("inf"), "(]")
     loop = closed_loop(agent, task, EnvOptions(friction_limit=friction_limit))
-    axes, plane = _plane(loop, points)
+    axes, plane = section_grid(loop, axes_around_start(loop, PLANE, points), loop.start)
     everything = np.concatenate([box_starts(loop, starts), plane])
     walks = walk_many(loop, everything, MOST_STEPS + SETTLE_STEPS).require_solved()
     bare = np.ascontiguousarray(everything[:, :STATE_SIZE])
@@ -124,7 +124,7 @@ def examine_capture(
     shape = (points, points)
     return CaptureReport(
         task, name, friction_limit, least[:starts], walks.survived[:starts],
-        least[starts:].reshape(shape), walks.survived[starts:].reshape(shape), axes,
+        least[starts:].reshape(shape), walks.survived[starts:].reshape(shape), (axes[PLANE[0]], axes[PLANE[1]]),
     )  # fmt: skip
 
 
@@ -143,18 +143,6 @@ def _least_steps(walker: Walker, task: str, states: bytes) -> NDArray[np.int64]:
         walker, starts, choices, most_steps=MOST_STEPS, settle_steps=SETTLE_STEPS, mass_offset=(pumping, -pumping)
     )  # fmt: skip
     return found.least_steps
-
-
-def _plane(loop: ClosedLoopMap, points: int) -> tuple[tuple[Vector, Vector], Vector]:
-    """The values of the plane's coordinates around the loop's start, and its states, row by row."""
-    index = [loop.names.index(name) for name in PLANE]
-    x, y = (
-        loop.start[k] + REACHES[name] * np.linspace(-1.0, 1.0, points)
-        for k, name in zip(index, PLANE, strict=True)
-    )
-    states = np.tile(loop.start, (points * points, 1))
-    states[:, index[0]], states[:, index[1]] = np.repeat(x, points), np.tile(y, points)
-    return (x, y), states
 
 
 def examine_captures(
@@ -195,16 +183,13 @@ def examine_captures(
 
 def write_captures(reports: Sequence[CaptureReport], out: Path) -> list[Path]:
     """Write capture.csv and a picture for each task and friction limit into a folder; return the paths."""
-    (out / "images").mkdir(parents=True, exist_ok=True)
-    text = io.StringIO()
-    writer: csv.DictWriter[str] = csv.DictWriter(text, COLUMNS)
-    writer.writeheader()
-    writer.writerows(row for report in reports for row in report.rows())
-    write_text(out / "capture.csv", text.getvalue())
+    (out / IMAGES).mkdir(parents=True, exist_ok=True)
+    rows = ([row[name] for name in COLUMNS] for report in reports for row in report.rows())
+    write_text(out / "capture.csv", csv_table(COLUMNS, rows))
     paths = [out / "capture.csv"]
     for task, limit in dict.fromkeys((report.task, report.friction_limit) for report in reports):
         floor = "" if limit == float("inf") else f"_friction_{limit:g}"
-        paths.append(out / "images" / f"capture_{task.lower()}{floor}.png")
+        paths.append(out / IMAGES / f"capture_{task.lower()}{floor}.png")
         these = [each for each in reports if (each.task, each.friction_limit) == (task, limit)]
         save_capture(these, paths[-1])
     return paths

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,10 +17,8 @@ from lean_yaw_env.files import write_text
 from .closed_loop_interface import GOAL_AHEAD
 from .closed_loop_pictures import save_basins, save_eigenvalues, save_pushes
 from .closed_loop_report import LINES, REACHES, STEPS, ZERO, Cell, ClosedLoopReport
-from .row_tables import markdown_table
+from .row_tables import IMAGES, csv_table, markdown_table
 
-IMAGES = "images"
-"""Folder of the pictures beside the page."""
 _HEAD = """# Walker and agent as one system
 
 The leaderboard says how good an agent is, but not why. With the command held constant, walker and agent together are one dynamical system. From heel strike
@@ -111,11 +107,9 @@ def show(reports: Sequence[ClosedLoopReport], notes: Mapping[str, str]) -> None:
 
 def csv_text(reports: Sequence[ClosedLoopReport]) -> str:
     """A row for each agent and task, a column for each line, full precision; empty where there is no number."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")  # which writes None as nothing
-    writer.writerow(["task", "agent", *(line.name for line in LINES)])
-    writer.writerows([r.task, r.agent, *(line.value(r) for line in LINES)] for r in reports)
-    return out.getvalue()
+    titles = ["task", "agent", *(line.name for line in LINES)]
+    rows = ([r.task, r.agent, *(line.value(r) for line in LINES)] for r in reports)
+    return csv_table(titles, rows)
 
 
 def eigenvalue_table(reports: Sequence[ClosedLoopReport]) -> str:

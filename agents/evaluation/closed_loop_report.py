@@ -133,11 +133,14 @@ def examine_all(
 
 def basin_around_start(loop: ClosedLoopMap, x: str, y: str, points: int) -> xarray.Dataset:
     """The basin in a plane through the loop's start, which is the walker's own gait and the same for every agent."""
-    axes = [
-        (name, loop.start[loop.names.index(name)] + REACHES[name] * np.linspace(-1.0, 1.0, points))
-        for name in (x, y)
-    ]
-    return basin(loop, *axes, centre=loop.start, n_steps=STEPS)
+    axes = axes_around_start(loop, (x, y), points)
+    return basin(loop, *axes.items(), centre=loop.start, n_steps=STEPS)
+
+
+def axes_around_start(loop: ClosedLoopMap, names: Sequence[str], points: int) -> dict[str, Vector]:
+    """Values (points,) of some coordinates, ``REACHES`` to either side of the loop's start."""
+    steps = np.linspace(-1.0, 1.0, points)
+    return {name: loop.start[loop.names.index(name)] + REACHES[name] * steps for name in names}
 
 
 def share_survived(found: xarray.Dataset) -> float:

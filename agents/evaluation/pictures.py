@@ -129,8 +129,7 @@ def save_agents_footprints(
         episode = record_episode(agent, task, seed=seed, options=options, most_steps=PICTURED_STEPS)
         ending = " (ended early)" if episode.terminated else ""
         episodes[name + (" (fell)" if episode.fall else ending)] = episode
-    everything = (goal for each in episodes.values() for goal in each.scene.goals)
-    goals = tuple((goal.downhill, goal.right) for goal in everything)
+    goals = [(goal.downhill, goal.right) for each in episodes.values() for goal in each.scene.goals]
     # the same episode has the same body for every agent
     radius = next(iter(episodes.values())).scene.parameters.foot_radius
     figure, panels = footprint_figure(episodes, foot_radius=radius, places=goals)

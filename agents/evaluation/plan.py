@@ -30,7 +30,6 @@ from ..agent import Agent
 from ..policies.policy import package_versions
 from ..policies.policy_files import CARD_FILE, WEIGHTS_FILE, load, options_to_plain
 from ..registry import (
-    AGENTS,
     AgentRequest,
     agent_entry,
     env_id_of,
@@ -39,6 +38,7 @@ from ..registry import (
     policy_folders,
 )
 from ..seeds import MOST_EPISODES, EpisodeSet, first_seed
+from .comparison import kind_of
 from .entries import is_entry, load_entry, read_entry
 from .episodes import Episodes, Results
 from .scoring import run_seeds
@@ -91,7 +91,7 @@ class _Chunk:
             "seeds": [self.seeds.start, self.seeds.stop],
             "policy": _policy_digest(candidate.entry, self.folder),
             "code": _code_digest(),
-            "versions": package_versions(),
+            "versions": _versions(),
         }
         digest = hashlib.sha256(json.dumps(depends, sort_keys=True).encode()).hexdigest()
         return cache / f"{candidate.task}-{candidate.agent}-{digest[:24]}.npz"
@@ -195,7 +195,7 @@ class Evaluation:
 
 
 def _plans(agent: str) -> bool:
-    return agent in AGENTS and AGENTS[agent].kind == "planner"
+    return kind_of(agent) == "planner"
 
 
 def _gathered(
@@ -287,6 +287,10 @@ def _read(path: Path) -> _Outcome | None:
             return Episodes(kept["survived"], metrics), float(kept["seconds"])
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
         return None
+
+
+_versions = lru_cache(maxsize=1)(package_versions)
+"""They are read from the disk, which takes longer than all else in a chunk's name."""
 
 
 @lru_cache(maxsize=1)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lean_yaw_env.envs.tasks import task_named
-from lean_yaw_env.files import read_json, write_text
+from lean_yaw_env.files import read_json, write_json
 from lean_yaw_env.parameters import Vector
 
 from ..policies.policy import package_versions
@@ -43,7 +42,7 @@ def write_results(results: Results, folder: Path, episode_set: EpisodeSet, seed:
         ],
     }
     path = folder / f"{results.task}-{results.agent}.json"
-    write_text(path, json.dumps(record, allow_nan=False) + "\n")
+    write_json(path, record, indent=None)  # a line for each number would make a long file
     return path
 
 

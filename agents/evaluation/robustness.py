@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -21,9 +19,8 @@ from lean_yaw_env.rendering.figures import new_figure, save_figure
 from ..policies.policy_files import options_to_plain
 from .comparison import kind_of
 from .episodes import Row, metric_row
-from .leaderboard import IMAGES
 from .plan import Candidate, Evaluation
-from .row_tables import bracketed, markdown_table, mean, number
+from .row_tables import IMAGES, bracketed, csv_table, markdown_table, mean, number
 
 NOMINAL = "as it is"
 VARIATIONS: dict[str, Callable[[TaskOptions], Mapping[str, Any]]] = {
@@ -109,15 +106,14 @@ def write_robustness(rows: Sequence[VariedRow], out: Path, command: str) -> Path
 
 def robustness_csv(rows: Sequence[VariedRow]) -> str:
     """A line for each row: task, agent, variation, its options as JSON, metric, mean with interval, survival, episodes and trainings."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
     names = ("metric", "mean", "low", "high", "survival", "episodes", "trainings")
-    writer.writerow(["task", "agent", "variation", "options", *names])
+    titles = ("task", "agent", "variation", "options", *names)
+    lines: list[list[object]] = []
     for variation, options, row in rows:
         values = [getattr(row, name) for name in names]
         plain = json.dumps(options_to_plain(options))
-        writer.writerow([row.task, row.agent, variation, plain, *values])
-    return text.getvalue()
+        lines.append([row.task, row.agent, variation, plain, *values])
+    return csv_table(titles, lines)
 
 
 def save_robustness_picture(rows: Sequence[VariedRow], path: Path) -> None:

@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, fields
 
 from rich import box
@@ -18,6 +18,8 @@ from lean_yaw_env.envs.tasks import task_named
 from .episodes import SURVIVAL, Row, is_share
 from .intervals import Estimate
 
+IMAGES = "images"
+"""Folder of a page's pictures, beside it."""
 _WIDTH = 5  # agents in a table: so many fit a terminal of 80 columns
 
 
@@ -39,11 +41,8 @@ def rows_to_json(rows: Sequence[Row]) -> str:
 
 def rows_to_csv(rows: Sequence[Row]) -> str:
     """A line for each row under the names of its fields; what is undefined is empty."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, [field.name for field in fields(Row)], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows_to_plain(rows))
-    return text.getvalue()
+    titles = [field.name for field in fields(Row)]
+    return csv_table(titles, (each.values() for each in rows_to_plain(rows)))
 
 
 def results_table(rows: Sequence[Row]) -> Table:
@@ -118,6 +117,13 @@ def markdown_table(
     """A table in Markdown, all columns but the first aligned to the right if asked for."""
     rule = ["---", *(["---:" if align_right else "---"] * (len(titles) - 1))]
     return "\n".join("| " + " | ".join(line) + " |" for line in (titles, rule, *lines))
+
+
+def csv_table(titles: Sequence[str], lines: Iterable[Iterable[object]]) -> str:
+    """A table as CSV; None is empty."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([titles, *lines])
+    return text.getvalue()
 
 
 def show(rows: Sequence[Row], console: Console, *, as_json: bool = False) -> None:

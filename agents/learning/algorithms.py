@@ -51,6 +51,13 @@ ALGORITHMS: dict[str, Algorithm] = {
 """By the names that their policies carry."""
 
 
+def algorithm_for(name: str, task: str) -> Algorithm:
+    """The algorithm of that name, or ``ValueError`` if there is none or it cannot learn the task."""
+    entry = ALGORITHMS[require_choice("algorithm", name, ALGORITHMS)]
+    require_choice(f"task of {name}", task, entry.tasks)
+    return entry
+
+
 def settings_for(algorithm: str, task: str) -> Any:
     """An algorithm's settings for a task: those that come with the package, or the default ones.
 
@@ -59,9 +66,7 @@ def settings_for(algorithm: str, task: str) -> Any:
     ValueError
         For an algorithm or a task there is not, or a task that the algorithm cannot learn.
     """
-    entry = ALGORITHMS[require_choice("algorithm", algorithm, ALGORITHMS)]
-    require_choice(f"task of {algorithm}", task, entry.tasks)
-    return tuned(algorithm, task, entry.settings())
+    return tuned(algorithm, task, algorithm_for(algorithm, task).settings())
 
 
 def train(

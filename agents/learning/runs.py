@@ -31,7 +31,7 @@ from ..policies.policy_files import (
 from ..registry import AgentRequest, env_id_of, make_all
 from ..seeds import MOST_EPISODES, first_seed, training_seed
 from ..settings import with_values
-from .algorithms import ALGORITHMS, settings_for, train
+from .algorithms import ALGORITHMS, algorithm_for, settings_for, train
 from .curves import save_learning_curve
 from .learner import LearnerSettings, settings_to_plain
 from .recorder import Report, TrainingLog
@@ -75,8 +75,7 @@ class Training:
     def __post_init__(self) -> None:
         training_seed(self.seed)
         require_choice("env_id", self.env_id, ALL_ENV_IDS)
-        entry = ALGORITHMS[require_choice("algorithm", self.algorithm, ALGORITHMS)]
-        require_choice(f"task of {self.algorithm}", self.task, entry.tasks)
+        entry = algorithm_for(self.algorithm, self.task)
         if type(self.settings) is not entry.settings:
             raise ValueError(f"settings must be {entry.settings.__name__}, got {self.settings!r}")
         require_count("episodes", self.episodes, 1, MOST_EPISODES)

@@ -24,10 +24,10 @@ from lean_yaw_env.files import is_running, write_json
 from lean_yaw_env.validation import require_count, require_number
 
 from ..agent import Agent
-from ..evaluation.scoring import run_seeds
+from ..evaluation.scoring import run_episodes
 from ..learning.algorithms import train
 from ..registry import env_id_of
-from ..seeds import MOST_EPISODES, TRAINING_SEEDS, first_seed
+from ..seeds import MOST_EPISODES, TRAINING_SEEDS
 from ..settings import values_of
 from .spaces import Space, space_of
 
@@ -295,9 +295,8 @@ def _settings(trial: optuna.Trial, space: Space) -> Any:
 
 
 def _mean_return(agent: Agent, tuning: Tuning, options: EnvOptions | None = None) -> float:
-    first = first_seed("validation")
-    seeds = range(first, first + tuning.episodes)
-    return float(run_seeds(agent, tuning.task, seeds, options=options).metrics["return"].mean())
+    walked = run_episodes(agent, tuning.task, episodes=tuning.episodes, options=options)
+    return float(walked.metrics["return"].mean())
 
 
 def _trained_score(

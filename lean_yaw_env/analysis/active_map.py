@@ -20,6 +20,7 @@ from lean_yaw_env.analysis.section_map import (
     CycleStep,
     Linearised,
     SectionMap,
+    cycle_step,
     require_offsets,
     section_map_of,
 )
@@ -217,17 +218,6 @@ def step_rows(bodies: Vector, commands: Vector, states: Vector, foot: int) -> Ve
     sides = np.full(len(states), 1.0 - 2.0 * foot)
     step_batch(bodies, commands, np.ascontiguousarray(states), sides, rows, 0, len(states))
     return rows
-
-
-def cycle_step(
-    start: Vector, end: Vector, foot: Foot, command: Command, result: StepResult
-) -> CycleStep:
-    """An active walker's step between two states of its map."""
-    return CycleStep(
-        start=start, state=end, foot=foot, command=command, duration=result.duration, displacement=result.displacement,
-        least_normal_force=result.least_normal_force, greatest_friction=result.greatest_friction,
-        gravity_work=result.energy.gravity_work, shift_work=result.energy.shift_work,
-    )  # fmt: skip
 
 
 @section_map_of.register(Walker)

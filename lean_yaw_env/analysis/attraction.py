@@ -86,7 +86,6 @@ def basin(
         If there is no gait.
     """
     require_count("n_steps", n_steps, 1, 1_000_000)
-    require_flag("progress", progress)
     section_map = section_map_of(walker, **command)
     cycle = find_limit_cycle(section_map) if centre is None else None
     middle = require_centre(section_map, centre) if cycle is None else cycle.state

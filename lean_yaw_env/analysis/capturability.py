@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from lean_yaw_env.analysis.active_map import ActiveMap
 from lean_yaw_env.analysis.attraction import require_centre, section_grid
 from lean_yaw_env.analysis.limit_cycle import find_limit_cycle
-from lean_yaw_env.analysis.many_walks import walk_many
+from lean_yaw_env.analysis.many_walks import raise_for_failures, walk_many
 from lean_yaw_env.analysis.section_map import (
     CommandArguments,
     SectionMap,
@@ -28,10 +28,9 @@ from lean_yaw_env.analysis.section_map import (
     section_map_of,
 )
 from lean_yaw_env.analysis.storage import Growing
-from lean_yaw_env.errors import SolverError
-from lean_yaw_env.kernel.records import FAILED, STEPPED
+from lean_yaw_env.kernel.records import STEPPED
 from lean_yaw_env.parameters import Vector, require_inter_leg_angle, require_mass_offset
-from lean_yaw_env.threads import share_out
+from lean_yaw_env.threads import MOST_THREADS, share_out
 from lean_yaw_env.validation import (
     require_count,
     require_instance,
@@ -173,11 +172,8 @@ def capture(
         If the integrator fails.
     """
     section_map = section_map_of(walker, **command)
-    require_count("most_steps", most_steps, 0, MOST_STEPS)
-    require_count("settle_steps", settle_steps, 1, 1_000_000)
-    require_count("threads", threads, 1, 1024)
+    _require_search(choices, most_steps, settle_steps, threads)
     states = require_shape("states", states, (None, len(section_map.names)))
-    require_instance("choices", choices, Choices)
     size = (len(states), most_steps, 2)
     if known is not None and require_instance("known", known, Capture).plans.shape != size:
         raise ValueError(f"known must be of the same states and most_steps, got {known!r}")
@@ -199,6 +195,14 @@ def capture(
 
         share_out(work, waiting.size, threads if isinstance(section_map, ActiveMap) else 1)
     return Capture(least, plans)
+
+
+def _require_search(choices: Choices, most_steps: int, settle_steps: int, threads: int) -> None:
+    """Raise ``ValueError`` for an argument of ``capture`` and ``capture_map`` that is outside its range."""
+    require_instance("choices", choices, Choices)
+    require_count("most_steps", most_steps, 0, MOST_STEPS)
+    require_count("settle_steps", settle_steps, 1, 1_000_000)
+    require_count("threads", threads, 1, MOST_THREADS)
 
 
 @dataclass(frozen=True)
@@ -250,12 +254,9 @@ class _Search:
         in_force = states[:, names.index("mass_offset")] if "mass_offset" in names else carried
         change, now = self.choices.largest_change, in_force[parents]
         asked[:, 1] = np.clip(asked[:, 1], now - change, now + change)
-        after, left, status = self.section_map.step_commanded(
-            states[parents], carried[parents], asked, foot
-        )
-        if (status == FAILED).any():
-            bad = parents[np.argmax(status == FAILED)]
-            raise SolverError(f"the step from {states[bad].tolist()} did not converge")
+        starts = states[parents]
+        after, left, status = self.section_map.step_commanded(starts, carried[parents], asked, foot)
+        raise_for_failures(status, starts)
         done = np.flatnonzero(status == STEPPED)
         won, rest = self.saved(after[done], left[done], 1 - foot, n - 1)
         is_saved = np.zeros((who.size, len(commands)), dtype=bool)
@@ -297,7 +298,6 @@ def refine_capture(
     require_number("tolerance", tolerance, 0.0, 1.0)
     require_count("most_levels", most_levels, 1, 6)
     levels: list[tuple[Choices, Capture]] = []
-    require_instance("choices", choices, Choices)
     known = None
     for _ in range(most_levels):
         found = capture(
@@ -352,10 +352,7 @@ def capture_map(
         If the integrator fails.
     """
     section_map = section_map_of(walker, **command)
-    require_instance("choices", choices, Choices)
-    require_count("most_steps", most_steps, 0, MOST_STEPS)
-    require_count("settle_steps", settle_steps, 1, 1_000_000)
-    require_count("threads", threads, 1, 1024)
+    _require_search(choices, most_steps, settle_steps, threads)
     if not require_mapping("axes", axes):
         raise ValueError(f"axes must name one or more coordinates, got {axes!r}")
     if centre is None:

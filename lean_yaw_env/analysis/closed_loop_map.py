@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lean_yaw_env.analysis.active_map import completed_step, cycle_step, has_downhill, step_rows
+from lean_yaw_env.analysis.active_map import completed_step, has_downhill, step_rows
 from lean_yaw_env.analysis.fixed_point import solve_fixed_point
 from lean_yaw_env.analysis.many_walks import walk_many
 from lean_yaw_env.analysis.section_map import (
@@ -27,6 +27,7 @@ from lean_yaw_env.analysis.section_map import (
     Linearised,
     Motion,
     SectionMap,
+    cycle_step,
 )
 from lean_yaw_env.analysis.step_derivatives import BY_BODY, BY_COMMAND, differentiate_step
 from lean_yaw_env.errors import NoGaitError

@@ -30,7 +30,8 @@ from lean_yaw_env.analysis.storage import Growing, require_axis, require_memory
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.records import Body, Outcome
 from lean_yaw_env.parameters import STATE_SIZE, Vector
-from lean_yaw_env.validation import require_count, require_flag, require_mapping
+from lean_yaw_env.threads import MOST_THREADS
+from lean_yaw_env.validation import require_count, require_mapping
 
 if TYPE_CHECKING:
     import xarray
@@ -91,8 +92,7 @@ def stability_map(
     ValueError
         If an argument is outside its range, or the file holds another map.
     """
-    require_count("threads", threads, 1, 1024)
-    require_flag("progress", progress)
+    require_count("threads", threads, 1, MOST_THREADS)
     grid = _Grid(section_map_of(walker, **command), axes)
     require_memory("axes", grid.n, _bytes(grid))
     values = _empty(grid.section_map, grid.n)

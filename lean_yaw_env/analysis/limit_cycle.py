@@ -252,8 +252,6 @@ def find_passive_gaits(walker: PassiveWalker) -> tuple[LimitCycle, ...]:
     NoGaitError
         If there is none; says what was tried.
     """
-    if not isinstance(walker, PassiveWalker):
-        raise ValueError(f"walker must be a PassiveWalker, got {walker!r}")
     section_map = PassiveMap(walker)
     cycles = [cycle_at(section_map, state) for state in section_map.search()]
     return tuple(sorted(cycles, key=lambda cycle: -cycle.stride_period))

@@ -56,11 +56,16 @@ class ManyWalks:
 
     def require_solved(self) -> ManyWalks:
         """Return these walks, or raise ``SolverError`` if the integrator has given up on one: it has not fallen."""
-        failed = self.endings == records.FAILED
-        if failed.any():
-            bad = self.states[np.argmax(failed)].tolist()
-            raise SolverError(f"the step from {bad} did not converge")
+        raise_for_failures(self.endings, self.states)
         return self
+
+
+def raise_for_failures(statuses: Vector, states: Vector) -> None:
+    """Raise ``SolverError`` if the integrator has given up on one of the steps from states (n, k) with statuses (n,)."""
+    failed = statuses == records.FAILED
+    if failed.any():
+        bad = states[np.argmax(failed)].tolist()
+        raise SolverError(f"the step from {bad} did not converge")
 
 
 def walk_many(

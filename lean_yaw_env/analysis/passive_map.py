@@ -18,6 +18,7 @@ from lean_yaw_env.analysis.section_map import (
     CycleStep,
     Linearised,
     SectionMap,
+    cycle_step,
     require_no_command,
     section_map_of,
 )
@@ -36,7 +37,7 @@ from lean_yaw_env.passive import (
     step_passive_rows,
 )
 from lean_yaw_env.validation import require_choice, require_count, require_instance
-from lean_yaw_env.walker import SIDE, Walker, raise_for_failure
+from lean_yaw_env.walker import SIDE, Walker, raise_for_failure, require_completed
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -94,13 +95,8 @@ class PassiveMap(SectionMap):
         for k in range(self.n_steps):
             foot = FEET_IN_TURN[k % 2]
             result = self.walker.step(state, stance=foot, inter_leg_angle=angle)
-            if result.fall is not None:
-                raise FellError(f"the walker fell {result.fall.value} in step {k + 1} of the gait")
-            steps.append(CycleStep(
-                start=state, state=result.state, foot=foot, command=_NO_COMMAND, duration=result.duration, displacement=result.displacement,
-                least_normal_force=result.least_normal_force, greatest_friction=result.greatest_friction,
-                gravity_work=result.energy.gravity_work, shift_work=0.0,
-            ))  # fmt: skip
+            require_completed(result, f"step {k + 1} of the gait")
+            steps.append(cycle_step(state, result.state, foot, _NO_COMMAND, result))
             state, angle = result.state, result.inter_leg_angle
         return steps
 

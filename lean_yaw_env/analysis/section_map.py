@@ -20,7 +20,7 @@ from lean_yaw_env.kernel.records import BODY_INPUTS, Command
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, Foot, Vector, require_mass_offset
 from lean_yaw_env.passive import PassiveWalker
 from lean_yaw_env.validation import require_choice
-from lean_yaw_env.walker import Walker
+from lean_yaw_env.walker import StepResult, Walker
 
 if TYPE_CHECKING:
     from typing_extensions import Self, Unpack
@@ -77,6 +77,17 @@ class CycleStep:
     greatest_friction: float
     gravity_work: float
     shift_work: float
+
+
+def cycle_step(
+    start: Vector, end: Vector, foot: Foot, command: Command, result: StepResult
+) -> CycleStep:
+    """A walker's completed step between two states of its map."""
+    return CycleStep(
+        start=start, state=end, foot=foot, command=command, duration=result.duration, displacement=result.displacement,
+        least_normal_force=result.least_normal_force, greatest_friction=result.greatest_friction,
+        gravity_work=result.energy.gravity_work, shift_work=result.energy.shift_work,
+    )  # fmt: skip
 
 
 class Linearised(NamedTuple):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.files import require_path, written_whole
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.validation import require_array, require_flag, require_instance
@@ -26,13 +27,9 @@ SAVED_EVERY = 10.0
 
 
 def labelled() -> Any:
-    """The xarray module, or ``ImportError`` saying how to install it."""
-    try:
+    """The xarray module, or ``MissingLibraryError`` saying how to install it."""
+    with needs_extra("analysis"):
         import xarray
-    except ImportError as error:
-        raise ImportError(
-            "maps and basins are labelled arrays: run `pip install 'lean-yaw-env[analysis]'`"
-        ) from error
     return xarray
 
 

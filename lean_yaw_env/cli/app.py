@@ -16,6 +16,8 @@ from lean_yaw_env.cli import plots, records
 from lean_yaw_env.cli.commands import Output, add_command, parse_axes, parse_range
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.threads import MOST_THREADS
+from lean_yaw_env.validation import require_count
 from lean_yaw_env.walker import Walker
 
 app = typer.Typer(
@@ -89,6 +91,7 @@ def stability(
     axes = parse_axes(axis)
     points = math.prod(values.size for values in axes.values())
     if points > _MANY_POINTS:
+        require_count("threads", threads, 1, MOST_THREADS)
         require_memory("axes", points, _RECORD)
         size, seconds = map_cost(
             walker, axes, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lean_yaw_env.analysis import LimitCycle, modes
+from lean_yaw_env.parameters import STATE_SIZE
 from lean_yaw_env.passive import PassiveWalker
 from lean_yaw_env.rendering.figures import new_figure
 from lean_yaw_env.rendering.palette import (
@@ -45,16 +46,15 @@ def gait_figure(cycle: LimitCycle) -> Figure:
     angles, force, plane = figure.subplots(1, 3, width_ratios=(1.3, 1.0, 1.0))
     walker, began = cycle.section_map.walker, 0.0
     for step in cycle.steps:
-        is_passive = isinstance(walker, PassiveWalker)
         motion = cycle.section_map.stander.stance_motion(
-            step.start[:5],
+            step.start[:STATE_SIZE],
             duration=step.duration,
             stance=step.foot,
-            **({} if is_passive else step.command._asdict()),
+            **step.command._asdict(),
         )
         time = began + motion["time"]
         curves = {"stance leg": motion["stance_pitch"], "ankle": motion["ankle_angle"]}
-        if is_passive:
+        if isinstance(walker, PassiveWalker):
             swing = walker.motion(step.start, duration=step.duration, stance=step.foot)
             curves["swing leg"] = swing["stance_pitch"] + swing["inter_leg_angle"]
         for (name, curve), colour in zip(curves.items(), _COLOURS, strict=False):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +27,22 @@ FRAMES_PER_SECOND = 30
 MOST_PICTURES = 64
 
 
+class _Instant(NamedTuple):
+    """What a scene just after a heel strike, or after a fall, is made from: the pose, both records as they were, and what lay behind."""
+
+    pose: Pose
+    walker: Any
+    task: Any
+    footprints: int
+    goals: int
+    motions: int
+
+
 class Footage:
-    """One walker's walk so far, the first's by default, and scenes made of it."""
+    """One walker's walk so far, the first's by default, and scenes made of it.
+
+    To take in a step only notes what has happened; the motion and the scene are made when they are asked for.
+    """
 
     def __init__(self, simulation: Simulation, row: int = 0) -> None:
         self._simulation = simulation
@@ -37,11 +52,12 @@ class Footage:
         self._headings: list[float] = []
         self._feet: list[Foot] = []
         self._goal_places: list[tuple[float, float]] = []
-        self._motion: StepMotion | None = None
+        self._motions: list[StepMotion] = []
         pose = self._pose()
         self._path = walker_shape(self._walker.parameters, pose).centre[None, [0, 2]]
+        self._path_ends = [1]  # rows of the path after so many steps, as far as it is made
         self._set_down(pose)
-        self._before = self._after = self._scene(pose)
+        self._before = self._after = self._instant(pose)
 
     def extend(self) -> None:
         """Take in the step that the walker has just made."""
@@ -49,36 +65,38 @@ class Footage:
         fall = FallCode(int(walker.fall))
         stays = fall is FallCode.SOLVER  # the walker stands where the step began
         self._before = self._after
-        self._motion = motion = StepMotion(
+        motion = StepMotion(
             self._walker,
             self._before.pose,
             inter_leg_angle=float(walker.inter_leg_angle),
             mass_offset=float(walker.commanded_offset),
             duration=0.0 if stays else float(walker.duration),
         )
-        self._path = np.vstack([self._path, motion.path()])
-        pose = motion.pose(1.0)
+        self._motions.append(motion)
         if fall is FallCode.NONE:
             pose = self._pose()
             self._set_down(pose)
-        self._after = self._scene(pose)
+        else:
+            pose = motion.pose(1.0)
+        self._after = self._instant(pose)
 
     @property
     def motion(self) -> StepMotion:
         """The motion within the last step; there is none before the first."""
-        assert self._motion is not None, "the walk has not begun"
-        return self._motion
+        assert self._motions, "the walk has not begun"
+        return self._motions[-1]
 
     def scene(self, share: float = 1.0) -> Scene:
         """What there is to draw after a share of the last step: at 1, just after the heel strike or where the walker fell."""
         if share >= 1.0:
-            return self._after
-        path = np.vstack([self._before.path, self.motion.path(share)])
-        return replace(self._before, pose=self.motion.pose(share), path=path)
+            return self._scene(self._after)
+        scene = self._scene(self._before)
+        path = np.vstack([scene.path, self.motion.path(share)])
+        return replace(scene, pose=self.motion.pose(share), path=path)
 
     def shares(self) -> list[float]:
         """When in the last step a picture is due, ``FRAMES_PER_SECOND`` in real time, as shares of the step."""
-        if self._motion is None:
+        if not self._motions:
             return [1.0]
         end = float(self._simulation.walkers["time"][self._row])
         rate, duration = FRAMES_PER_SECOND * SECONDS_PER_TIME_UNIT, self.motion.duration
@@ -97,27 +115,42 @@ class Footage:
             if place not in self._goal_places[-1:]:
                 self._goal_places.append(place)
 
-    def _scene(self, pose: Pose) -> Scene:
-        walker, task = self._simulation.records(self._row)
-        kind = self._simulation.task
+    def _instant(self, pose: Pose) -> _Instant:
+        walker, task = (each.copy() for each in self._simulation.records(self._row))
+        n_prints, n_goals = len(self._footprints), len(self._goal_places)
+        return _Instant(pose, walker, task, n_prints, n_goals, len(self._motions))
+
+    def _path_after(self, steps: int) -> Vector:
+        """The centre of mass until so many steps were made, (downhill, right), shape (k, 2)."""
+        made = len(self._path_ends) - 1
+        if made < steps:
+            new = [motion.path() for motion in self._motions[made:steps]]
+            self._path = np.vstack([self._path, *new])
+            self._path_ends += (
+                self._path_ends[-1] + np.cumsum([len(each) for each in new])
+            ).tolist()
+        return self._path[: self._path_ends[steps]]
+
+    def _scene(self, instant: _Instant) -> Scene:
+        walker, task, kind = instant.walker, instant.task, self._simulation.task
+        path, goals = self._path_after(instant.motions), self._goal_places[: instant.goals]
         command = None if kind.heading_field is None else float(task[kind.heading_field])
         time, fall = float(walker.time), FallCode(int(walker.fall)).word
         wanted = command  # or where the goal in force is from here, which may be beyond the picture
-        if command is None and self._goal_places:
-            downhill, right = np.subtract(self._goal_places[-1], self._path[-1])
+        if command is None and goals:
+            downhill, right = np.subtract(goals[-1], path[-1])
             wanted = math.atan2(-right, downhill)
-        reached = len(self._goal_places) - 1
         return Scene(
             parameters=self._walker.parameters,
-            pose=pose,
-            footprints=np.array(self._footprints),
-            headings=np.array(self._headings),
-            feet=tuple(self._feet),
-            path=self._path,
+            pose=instant.pose,
+            footprints=np.array(self._footprints[: instant.footprints]),
+            headings=np.array(self._headings[: instant.footprints]),
+            feet=tuple(self._feet[: instant.footprints]),
+            path=path,
             commanded_heading=wanted,
             goals=[
-                Goal(*place, kind.goal_radius, reached=k < reached)
-                for k, place in enumerate(self._goal_places)
+                Goal(*place, kind.goal_radius, reached=k < len(goals) - 1)
+                for k, place in enumerate(goals)
             ],
             reference_path=None
             if kind.reference_path is None

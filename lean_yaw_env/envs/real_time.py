@@ -51,7 +51,7 @@ class RealTime(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs)
         self._walker_env = env.unwrapped
         self._frame_time = speed / SECONDS_PER_TIME_UNIT / fps
         self._hold_time = HOLD_SECONDS * speed / SECONDS_PER_TIME_UNIT
-        self._left = 0.0
+        self._left = self._hold = self._duration = 0.0
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -88,8 +88,6 @@ class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float
         )  # fmt: skip
         self.num_envs = require_count("num_envs", num_envs)
         self.threads = require_count("threads", threads, 1, MOST_THREADS)
-        if max_episode_steps is not None:
-            require_count("max_episode_steps", max_episode_steps)
         if render_mode is not None:
             require_choice("render_mode", render_mode, _RENDER_MODES)
             require_count("num_envs with a render_mode", num_envs, 1, MOST_PICTURES)

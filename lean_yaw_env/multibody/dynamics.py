@@ -238,8 +238,11 @@ class Stance:
         rows = here.jacobian[CONTACT, :N_COORDINATES]
         if is_held:
             rows, bottom = np.vstack([rows, _INTER_LEG_ROW]), np.append(bottom, 0.0)
-        corner = np.zeros((len(rows), len(rows)))
-        matrix = np.block([[weighted @ positions, -rows.T], [rows, corner]])
+        size = N_COORDINATES + len(rows)
+        matrix = np.zeros((size, size))  # filled by parts: np.block takes longer than the solution
+        matrix[:N_COORDINATES, :N_COORDINATES] = weighted @ positions
+        matrix[:N_COORDINATES, N_COORDINATES:] = -rows.T
+        matrix[N_COORDINATES:, :N_COORDINATES] = rows
         right_side = np.concatenate([weighted @ top, bottom])
         solution = np.asarray(np.linalg.solve(matrix, right_side), dtype=np.float64)
         return solution[:N_COORDINATES], solution[N_COORDINATES:]

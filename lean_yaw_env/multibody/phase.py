@@ -56,7 +56,8 @@ def integrate(phase: Stance, start: Vector, tolerance: float) -> PhaseEnd:
             forces.append(phase.forces(time, y))
         return PhaseEnd(time, y, fall, tuple(times), tuple(samples), tuple(forces))
 
-    if phase.is_held and phase.swing_foot(start).clearance <= 0.0:
+    clearance = phase.swing_foot(start).clearance
+    if phase.is_held and clearance <= 0.0:
         return end(0.0, start, "trip")
     solver = DOP853(
         phase.derivative, 0.0, start, _LONGEST_STEP, rtol=tolerance, atol=0.1 * tolerance
@@ -69,8 +70,8 @@ def integrate(phase: Stance, start: Vector, tolerance: float) -> PhaseEnd:
         dense = solver.dense_output()
         for time in np.linspace(origin, solver.t, _SAMPLES_PER_STEP + 1)[1:].tolist():
             y = dense(time)
-            before = phase.swing_foot(samples[-1]).clearance
-            if before > 0.0 >= phase.swing_foot(y).clearance:
+            before, clearance = clearance, phase.swing_foot(y).clearance
+            if before > 0.0 >= clearance:
                 strike = _locate(phase, dense, (times[-1], time))
                 if _is_foot_in_front(phase, dense(strike)):
                     return end(strike, dense(strike), None)

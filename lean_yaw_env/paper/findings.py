@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import csv
-import io
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,10 +18,13 @@ from lean_yaw_env.analysis import (
     capture_map,
     find_limit_cycle,
     refine_capture,
+    section_map_of,
     stability_map,
 )
+from lean_yaw_env.analysis.attraction import section_grid
 from lean_yaw_env.files import write_text
 from lean_yaw_env.paper.drawing import FAINT, STABLE_FACE, name_axes, picture_of
+from lean_yaw_env.paper.report import write_columns
 from lean_yaw_env.parameters import Vector, WalkerParameters
 from lean_yaw_env.rendering.figures import new_figure
 from lean_yaw_env.walker import Walker
@@ -36,6 +39,10 @@ CLIMBER = Walker(WalkerParameters(slope_turns=True))
 SAVED = Walker(WalkerParameters(slope_turns=True, friction_limit=FRICTION))
 BODY_SLOPES = (0.003, 0.01, 0.03, 0.06)
 CHOSEN_STEPS = 3
+REACHES = {"stance_pitch": 0.1, "ankle_angle": 0.3, "stance_pitch_rate": 0.3, "ankle_rate": 0.8}
+"""How far from the gait the states of the box lie, by coordinate; heading aside."""
+PLANE = ("ankle_angle", "ankle_rate")
+"""Coordinates of the slice."""
 _SAVED_COLOURS = ("#2c7a4b", "#7dbb8b", "#d9b25f", "#d9743a", "#f2f2f2")
 _BODY_COLOURS = ("#cccccc", "#ffffff", STABLE_FACE)
 _RED = "#ff5a36"
@@ -69,25 +76,17 @@ def compute(*, size: float = 1.0, progress: bool = False) -> Findings:
     def points(n: int) -> int:
         return max(3, round(size * n))
 
-    gait = find_limit_cycle(SAVED).state
-    pitch, angle, pitch_rate, rate = gait[1:]
-    plane = {
-        "ankle_angle": angle + np.linspace(-0.3, 0.3, points(41)),
-        "ankle_rate": rate + np.linspace(-0.8, 0.8, points(41)),
-    }
-    few = points(7)
-    box = {
-        "stance_pitch": pitch + np.linspace(-0.1, 0.1, few),
-        "ankle_angle": angle + np.linspace(-0.3, 0.3, few),
-        "stance_pitch_rate": pitch_rate + np.linspace(-0.3, 0.3, few),
-        "ankle_rate": rate + np.linspace(-0.8, 0.8, few),
-    }
-    sample = np.tile(gait, (points(15) ** 2, 1))
-    sample[:, [2, 4]] = [
-        (a, b)
-        for a in angle + np.linspace(-0.3, 0.3, points(15))
-        for b in rate + np.linspace(-0.8, 0.8, points(15))
-    ]
+    section_map = section_map_of(SAVED)
+    gait = find_limit_cycle(section_map).state
+
+    def around(names: Iterable[str], n: int) -> dict[str, Vector]:
+        return {
+            name: gait[section_map.names.index(name)]
+            + np.linspace(-REACHES[name], REACHES[name], n)
+            for name in names
+        }
+
+    _, sample = section_grid(section_map, around(PLANE, points(15)), gait)
     coarse = Choices(np.linspace(0.15, 0.45, 3), np.linspace(-0.05, 0.05, 3))
     levels = refine_capture(SAVED, sample, coarse, most_levels=3, tolerance=0.0)
     pumping = {
@@ -103,8 +102,8 @@ def compute(*, size: float = 1.0, progress: bool = False) -> Findings:
     return Findings(
         stability_map(CLIMBER, pumping, progress=progress),
         stability_map(Walker(), body, progress=progress),
-        capture_map(SAVED, plane, most_steps=CHOSEN_STEPS, progress=progress),
-        capture_map(SAVED, box, most_steps=2, progress=progress),
+        capture_map(SAVED, around(PLANE, points(41)), most_steps=CHOSEN_STEPS, progress=progress),
+        capture_map(SAVED, around(REACHES, points(7)), most_steps=2, progress=progress),
         tuple((len(choices.commands), tuple(found.share(n) for n in range(3))) for choices, found in levels),
     )  # fmt: skip
 
@@ -305,11 +304,11 @@ def write_findings(folder: Path, *, size: float = 1.0, progress: bool = False) -
     """
     (folder / "images").mkdir(parents=True, exist_ok=True)
     found = compute(size=size, progress=progress)
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(("name", "value", "meaning"))
-    writer.writerows((name, value, meaning) for name, (value, meaning) in numbers(found).items())
-    write_text(folder / "findings.csv", text.getvalue())
+    rows = numbers(found)
+    values, meanings = zip(*rows.values(), strict=True)
+    write_columns(
+        folder / "findings.csv", {"name": list(rows), "value": values, "meaning": meanings}
+    )
     for name, draw in PICTURES.items():
         picture_of(draw(found))(folder / "images" / f"findings_{name}.png")
     write_text(folder / "findings.md", page(folder))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
 
@@ -44,28 +45,36 @@ class StepMotion:
         duration: float,
         swing_share: float = SWING_SHARE,
     ) -> None:
-        self._start = start
+        self._walker, self._start = walker, start
         self._angles = start.inter_leg_angle, inter_leg_angle
+        self._mass_offset = mass_offset
         self._swing_share = swing_share
         self.duration = max(duration, 1e-6)  # a fall at the start of a step lasts no time
-        motion = walker.stance_motion(
+
+    @cached_property
+    def _samples(self) -> tuple[list[Vector], Vector]:
+        """Stance pitch, ankle angle and mass offset, each (k,), and the centre of mass (k, 2); computed when the step is first drawn."""
+        start = self._start
+        motion = self._walker.stance_motion(
             start.state,
             duration=self.duration,
             samples=_SAMPLES,
             stance=start.stance,
-            inter_leg_angle=inter_leg_angle,
-            mass_offset=mass_offset,
+            inter_leg_angle=self._angles[1],
+            mass_offset=self._mass_offset,
             previous_offset=start.mass_offset,
         )
-        self._columns = [motion[name] for name in ("stance_pitch", "ankle_angle", "mass_offset")]
         cosine, sine = math.cos(start.state[0]), math.sin(start.state[0])
         ahead, right = motion["centre_x"], motion["centre_z"]
         turned = np.column_stack([cosine * ahead + sine * right, cosine * right - sine * ahead])
-        self._centre = start.contact + turned
+        columns = [motion[name] for name in ("stance_pitch", "ankle_angle", "mass_offset")]
+        return columns, start.contact + turned
 
     def pose(self, share: float) -> Pose:
         """Where the walker is after a share of the step, from 0 to 1."""
-        pitch, ankle, offset = (float(np.interp(share, _GRID, column)) for column in self._columns)
+        pitch, ankle, offset = (
+            float(np.interp(share, _GRID, column)) for column in self._samples[0]
+        )
         return Pose(
             state=np.array([self._start.state[0], pitch, ankle, 0.0, 0.0]),
             stance=self._start.stance,
@@ -76,7 +85,7 @@ class StepMotion:
 
     def path(self, share: float = 1.0) -> Vector:
         """The centre of mass so far, (downhill, right); shape (k, 2)."""
-        return self._centre[: math.floor(share * (_SAMPLES - 1)) + 1]
+        return self._samples[1][: math.floor(share * (_SAMPLES - 1)) + 1]
 
     def _inter_leg_angle(self, share: float) -> float:
         """As drawn: from where the swing leg comes from to the front."""

@@ -68,14 +68,12 @@ def draw_footprints(
         If there are not as many axes as walks, or no walks.
     """
     _require_walks(walks, foot_radius)
-    is_empty = places.size == 0 if isinstance(places, np.ndarray) else places in ((), [])
-    if not is_empty:
-        require_numbers("places", places, 2)
+    points = _points(places)
     axes = list(np.ravel(np.asarray(axes, dtype=object)))
     if not walks or len(axes) != len(walks):
         raise ValueError(f"axes must be as many as walks, 1 or more: {len(axes)} and {len(walks)}")
     length = footprint_length(foot_radius)
-    low, high = _extent(walks, places)
+    low, high = _extent(walks, points)
     for (name, walk), panel in zip(walks.items(), axes, strict=True):
         _draw_walk(panel, walk, length)
         panel.set_title(name)
@@ -102,7 +100,7 @@ def footprint_figure(
     """
     if not walks:
         raise ValueError("walks must hold one walk or more, got none")
-    low, high = _extent(walks, places)
+    low, high = _extent(walks, _points(places))
     lines = math.ceil(len(walks) / _COLUMNS)
     columns = math.ceil(len(walks) / lines)  # lines of equal length, but for the last
     # As tall as wide a panel would be, within bounds that suit a page
@@ -148,9 +146,15 @@ def _require_walks(walks: Any, foot_radius: Any) -> None:
     require_number("foot_radius", foot_radius, 0.0, 1.0, "[)")
 
 
-def _extent(walks: Mapping[str, WalkRecord], places: ArrayLike) -> tuple[Vector, Vector]:
+def _points(places: ArrayLike) -> Vector:
+    """Places as an array (k, 2), with k = 0 of an empty sequence; ``ValueError`` for anything else."""
+    is_empty = places.size == 0 if isinstance(places, np.ndarray) else places in ((), [])
+    return np.empty((0, 2)) if is_empty else require_numbers("places", places, 2).reshape(-1, 2)
+
+
+def _extent(walks: Mapping[str, WalkRecord], places: Vector) -> tuple[Vector, Vector]:
     """Corners (downhill, right) of what holds every footprint and place, wide enough to be a picture."""
-    points = np.vstack([*(walk.footprints for walk in walks.values()), np.reshape(places, (-1, 2))])
+    points = np.vstack([*(walk.footprints for walk in walks.values()), places])
     low, high = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
     short = np.maximum(_LEAST_WIDTH * (high - low).max() - (high - low), 0.0)
     return low - 0.5 * short, high + 0.5 * short
