@@ -37,6 +37,7 @@ DIFFERENT = {
     "any combination",
     "turning radius, as drawn",
     "beyond -50 %",
+    "limp",
 }
 """Disagreements that are known and explained."""
 

@@ -172,7 +172,7 @@ def steering_claims() -> Result:
         ),
         assess(
             "limp",
-            abs(left / right - 1.0) > 0.01,
+            0.01 < abs(right / left - 1.0) < 1.0,
             f"{left:.3f} on the left foot, {right:.3f} on the right, inner one",
             remark=f"More than somewhat: the steps on the inner foot last {right / left:.1f} times as long.",
         ),
