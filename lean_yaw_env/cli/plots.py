@@ -85,7 +85,7 @@ def _draw_multipliers(plane: Axes, cycle: LimitCycle) -> None:
     plane.axhline(0.0, color=_FAINT, linewidth=0.5)
     plane.axvline(0.0, color=_FAINT, linewidth=0.5)
     plane.set_aspect("equal", adjustable="datalim")
-    plane.legend(frameon=False, loc="upper left")
+    plane.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
     plane.set(xlabel="real part", ylabel="imaginary part", title="multipliers of the cycle")
 
 
@@ -170,7 +170,7 @@ def basin_figure(data: xarray.Dataset) -> Figure:
     centre = json.loads(data.attrs["centre"])
     axes.plot(centre[x], centre[y], "k+", markersize=12, markeredgewidth=2.0)
     handles: list[Any] = [
-        Patch(color=colour, label=f"{meanings[str(code)]} ({np.mean(endings == code):.0%})")
+        Patch(color=colour, label=f"{meanings[str(code)]} ({np.mean(endings == code):.1%})")
         for colour, code in zip(colours, found, strict=True)
     ]
     figure.legend(handles=handles, loc="outside right upper", frameon=False)

@@ -58,7 +58,7 @@ def skateboard() -> Result:
     titles = ("side view", "rear view", f"top view, θ = {_LEAN:g} rad")
     for axes, draw, title in zip(places, (_draw_side, _draw_rear, _draw_top), titles, strict=True):
         draw(axes, board)
-        axes.set_aspect("equal")
+        axes.set_aspect("equal", adjustable="datalim")  # all titles at one height
         axes.set_axis_off()
         axes.set_title(title, fontsize=10)
     checks = [*_equation_checks(board), *_board_checks(board)]
@@ -143,7 +143,6 @@ def _draw_side(axes: Axes, board: Skateboard) -> None:
         axes.plot([sign * half, sign * half + reach[0]], [0.04, 0.04 + reach[1]], **_THIN)
         axes.plot([sign * half] * 2, [0.04, 0.34], color=FAINT, linewidth=0.6, linestyle=":")
         axes.annotate("α, k", (sign * half + 0.05 * (sign - 1.0), 0.36), fontsize=9)
-    axes.set_ylim(-0.2, 1.15 * high)
     _measure(axes, (-half, -0.08), (half, -0.08), "w")
     _measure(axes, (0.5, 0.0), (0.5, high), "h")
     axes.annotate("v", (0.72, 0.12), xytext=(0.52, 0.1), arrowprops=_ARROW)
@@ -174,8 +173,7 @@ def _draw_top(axes: Axes, board: Skateboard) -> None:
         axes.plot(*np.array([middle, centre]).T, **_THIN)
     axes.plot(*centre, "k+", markersize=8)
     _measure(axes, (0.0, 0.0), (0.0, -radius), "$r_c$")
-    axes.annotate("a", (0.0, -0.25), xytext=(-0.02, 0.02), arrowprops=_ARROW)
-    axes.annotate("v", (half + 0.35, 0.0), xytext=(half + 0.1, -0.02), arrowprops=_ARROW)
+    axes.annotate("v", (0.12, 0.096), xytext=(-0.1, 0.08), arrowprops=_ARROW)
 
 
 def figure_3() -> Result:
