@@ -94,21 +94,31 @@ def test_a_climbing_walker_turns_round_by_itself() -> None:
 # --- stability over body and slope
 
 
-@pytest.mark.parametrize("slope", findings.BODY_SLOPES)
+@pytest.mark.parametrize("slope", findings.STABILITY["slope"])
 def test_the_stable_share_of_bodies_is_that_of_the_page(slope: float) -> None:
     axes = {"slope": np.array([slope]), "ankle_tilt": np.linspace(0.05, 1.3, 64), "hip_width": np.linspace(0.0, 0.6, 61)}  # fmt: skip
-    data = stability_map(Walker(), axes)
-    stable = (data.status == 1) & (data.spectral_radius < 1.0)
+    stable = findings.is_stable(stability_map(Walker(), axes))
     # a neighbour on another slope may lead to a gait that no neighbour here leads to
     assert float(stable.mean()) == pytest.approx(VALUES[f"stable_share_{slope:g}"], abs=0.005)
 
 
 def test_the_share_of_stable_bodies_grows_with_the_slope() -> None:
-    shares = [VALUES[f"stable_share_{slope:g}"] for slope in findings.BODY_SLOPES]
+    shares = [VALUES[f"stable_share_{slope:g}"] for slope in findings.STABILITY["slope"]]
     assert shares == sorted(shares)
 
 
-@pytest.mark.parametrize("slope", findings.BODY_SLOPES)
+def test_larger_feet_and_shorter_steps_make_more_bodies_stable_and_the_walk_faster() -> None:
+    for name, sign in (("foot_radius", 1.0), ("inter_leg_angle", -1.0)):
+        values = findings.STABILITY[name]
+        shares = [VALUES[f"stable_share_{name}_{value:g}"] for value in values]
+        assert np.all(sign * np.diff(shares) > 0.0)
+        speeds = stability_map(
+            Walker(), {name: np.array(values), "hip_width": np.array([0.1, 0.2])}
+        ).speed
+        assert np.all(sign * np.diff(speeds, axis=0) > 0.0)
+
+
+@pytest.mark.parametrize("slope", findings.STABILITY["slope"])
 @pytest.mark.parametrize("tilt", [0.12, 0.14])
 def test_below_the_least_tilt_each_step_turns_a_lean_into_a_greater_one_to_the_other_side(
     slope: float, tilt: float

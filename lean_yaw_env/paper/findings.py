@@ -1,4 +1,4 @@
-"""What this software finds beyond the paper: walking on the level, what chosen steps can save, stability over body and slope.
+"""What this software finds beyond the paper: walking on the level, what chosen steps can save, stability over body, slope and step.
 
 ``lean-yaw findings`` computes it, and writes the page with its numbers and pictures.
 """
@@ -37,7 +37,17 @@ FRICTION = 0.6
 CLIMBER = Walker(WalkerParameters(slope_turns=True))
 """On a slope that turns with the walker, so that balance is seen apart from the heading, which a controller must hold on a climb."""
 SAVED = Walker(WalkerParameters(slope_turns=True, friction_limit=FRICTION))
-BODY_SLOPES = (0.003, 0.01, 0.03, 0.06)
+STABILITY = {
+    "slope": (0.003, 0.01, 0.03, 0.06),
+    "foot_radius": (0.1, 0.3, 0.5, 0.7),
+    "inter_leg_angle": (0.2, 0.3, 0.4, 0.5),
+}
+"""By parameter, its values at which stability is mapped over ankle tilt and hip width; the others are Table 1's."""
+_SYMBOLS = {
+    "slope": "slope",
+    "foot_radius": "foot radius r =",
+    "inter_leg_angle": "inter-leg angle",
+}
 CHOSEN_STEPS = 3
 REACHES = {"stance_pitch": 0.1, "ankle_angle": 0.3, "stance_pitch_rate": 0.3, "ankle_rate": 0.8}
 """How far from the gait the states of the box lie, by coordinate; heading aside."""
@@ -57,14 +67,14 @@ class Findings:
     Attributes
     ----------
     pumping : over inter-leg angle, slope and alternating offset; slopes below zero are climbs
-    body : over slope, ankle tilt and hip width
+    stability : by parameter, over that parameter, ankle tilt and hip width
     slice : least chosen steps over ankle angle and ankle rate
     box : least chosen steps over all four coordinates beside the heading
     resolution : number of commands, and the shares saved by 0, 1 and 2 chosen steps, at ever finer ones
     """
 
     pumping: xarray.Dataset
-    body: xarray.Dataset
+    stability: dict[str, xarray.Dataset]
     slice: xarray.Dataset
     box: xarray.Dataset
     resolution: tuple[tuple[int, tuple[float, ...]], ...]
@@ -95,13 +105,15 @@ def compute(*, size: float = 1.0, progress: bool = False) -> Findings:
         "alternating_offset": np.linspace(0.002, 0.08, points(53)),
     }
     body = {
-        "slope": np.array(BODY_SLOPES),
         "ankle_tilt": np.linspace(0.05, 1.3, points(64)),
         "hip_width": np.linspace(0.0, 0.6, points(61)),
     }
     return Findings(
         stability_map(CLIMBER, pumping, progress=progress),
-        stability_map(Walker(), body, progress=progress),
+        {
+            name: stability_map(Walker(), {name: np.array(values), **body}, progress=progress)
+            for name, values in STABILITY.items()
+        },
         capture_map(SAVED, around(PLANE, points(41)), most_steps=CHOSEN_STEPS, progress=progress),
         capture_map(SAVED, around(REACHES, points(7)), most_steps=2, progress=progress),
         tuple((len(choices.commands), tuple(found.share(n) for n in range(3))) for choices, found in levels),
@@ -111,13 +123,18 @@ def compute(*, size: float = 1.0, progress: bool = False) -> Findings:
 def climbs(pumping: xarray.Dataset) -> dict[str, Vector]:
     """The steepest climb at each inter-leg angle, rad; nan where there is none: of any gait, of a stable one, and of one that a floor holds."""
     has_gait = pumping.status == 1
-    is_stable = has_gait & (pumping.spectral_radius < 1.0)
-    on_floor = is_stable & (pumping.greatest_friction <= FRICTION)
-    found = {"gait": has_gait, "stable": is_stable, "friction": on_floor}
+    stable = is_stable(pumping)
+    on_floor = stable & (pumping.greatest_friction <= FRICTION)
+    found = {"gait": has_gait, "stable": stable, "friction": on_floor}
     return {
         name: (-pumping.slope.where(where).min(("slope", "alternating_offset"))).to_numpy()
         for name, where in found.items()
     }
+
+
+def is_stable(data: xarray.Dataset) -> xarray.DataArray:
+    """Where a map has a stable gait."""
+    return (data.status == 1) & (data.spectral_radius < 1.0)
 
 
 def share_saved(least: Any, n_steps: int) -> float:
@@ -127,7 +144,7 @@ def share_saved(least: Any, n_steps: int) -> float:
 
 def numbers(found: Findings) -> dict[str, tuple[float, str]]:
     """Every number of the page by name, with its meaning."""
-    pumping, body = found.pumping, found.body
+    pumping, stability = found.pumping, found.stability
     angles = pumping.inter_leg_angle.to_numpy()
     rows: dict[str, tuple[float, str]] = {}
     words = {
@@ -139,7 +156,7 @@ def numbers(found: Findings) -> dict[str, tuple[float, str]]:
         rows[f"climb_{name}"] = float(climb[best]), f"steepest climb {words[name]}, rad"
         rows[f"climb_{name}_angle"] = float(angles[best]), "inter-leg angle there, rad"
     level = pumping.sel(slope=0.0, method="nearest")
-    held = (level.status == 1) & (level.spectral_radius < 1.0)
+    held = is_stable(level)
     on_floor = held & (level.greatest_friction <= FRICTION)
     for name, where in (("stable", held), ("friction", on_floor)):
         speed = level.speed.where(where)
@@ -156,9 +173,15 @@ def numbers(found: Findings) -> dict[str, tuple[float, str]]:
         "least alternating offset with a gait on the level at inter-leg angle 0.3",
     )
     rows["level_greatest_offset"] = float(offsets.max()), "greatest one"
-    for k, slope in enumerate(BODY_SLOPES):
-        here = body.isel(slope=k)
-        stable = (here.status == 1) & (here.spectral_radius < 1.0)
+    for name in ("foot_radius", "inter_leg_angle"):
+        for k, value in enumerate(STABILITY[name]):
+            rows[f"stable_share_{name}_{value:g}"] = (
+                float(is_stable(stability[name].isel({name: k})).mean()),
+                f"share of tilts and widths that are stable at {name} {value:g}",
+            )
+    for k, slope in enumerate(STABILITY["slope"]):
+        here = stability["slope"].isel(slope=k)
+        stable = is_stable(here)
         rows[f"stable_share_{slope:g}"] = (
             float(stable.mean()),
             f"share of tilts and widths that are stable at slope {slope:g}",
@@ -232,23 +255,27 @@ def draw_pumping(pumping: xarray.Dataset) -> Any:
     return figure
 
 
-def draw_body(body: xarray.Dataset) -> Any:
-    """Where the walker is stable over ankle tilt and hip width, slope by slope."""
+def draw_stability(stability: dict[str, xarray.Dataset]) -> Any:
+    """Where the walker is stable over ankle tilt and hip width: a line of pictures for each further parameter."""
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    figure = new_figure(11.0, 3.6)
-    tilt, width = body.ankle_tilt.to_numpy(), body.hip_width.to_numpy()
-    for k, axes in enumerate(figure.subplots(1, len(BODY_SLOPES), sharey=True)):
-        here = body.isel(slope=k)
-        kind = np.where(here.status == 1, np.where(here.spectral_radius < 1.0, 2.0, 1.0), 0.0)
-        axes.pcolormesh(tilt, width, kind.T, cmap=ListedColormap(_BODY_COLOURS), vmin=0.0, vmax=2.0)
-        axes.plot(0.55, 0.3, "k*", markersize=8)
-        title = f"slope {BODY_SLOPES[k]:g}"
-        name_axes(axes, "ankle tilt α (rad)", "hip width d" if k == 0 else "", title=title)
+    figure = new_figure(11.0, 8.4)
+    grid = figure.subplots(len(STABILITY), 4, sharex=True, sharey=True)
+    for line, (name, data) in zip(grid, stability.items(), strict=True):
+        tilt, width = data.ankle_tilt.to_numpy(), data.hip_width.to_numpy()
+        for k, (axes, value) in enumerate(zip(line, STABILITY[name], strict=True)):
+            here = data.isel({name: k})
+            kind = np.where(here.status == 1, np.where(is_stable(here), 2.0, 1.0), 0.0)
+            colours = ListedColormap(_BODY_COLOURS)
+            axes.pcolormesh(tilt, width, kind.T, cmap=colours, vmin=0.0, vmax=2.0)
+            axes.plot(0.55, 0.3, "k*", markersize=8)
+            below = "ankle tilt α (rad)" if name == list(STABILITY)[-1] else ""
+            title = f"{_SYMBOLS[name]} {value:g}"
+            name_axes(axes, below, "hip width d" if k == 0 else "", title=title)
     words = ("no gait", "a gait that is not stable", "a stable gait")
     handles: list[Any] = [Patch(facecolor=c, edgecolor="0.5", label=t) for c, t in zip(_BODY_COLOURS, words, strict=True)]  # fmt: skip
-    handles += axes.plot([], [], "k*", markersize=8, label="Table 1's body")
+    handles += grid[0, 0].plot([], [], "k*", markersize=8, label="Table 1's tilt and width")
     figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
     return figure
 
@@ -291,7 +318,7 @@ def draw_capture(found: Findings) -> Any:
 
 PICTURES = {
     "pumping": lambda found: draw_pumping(found.pumping),
-    "body": lambda found: draw_body(found.body),
+    "stability": lambda found: draw_stability(found.stability),
     "capture": draw_capture,
 }
 """By the end of the file's name: what draws it."""
