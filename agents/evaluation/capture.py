@@ -186,10 +186,15 @@ def write_captures(reports: Sequence[CaptureReport], out: Path) -> list[Path]:
     (out / IMAGES).mkdir(parents=True, exist_ok=True)
     rows = ([row[name] for name in COLUMNS] for report in reports for row in report.rows())
     write_text(out / "capture.csv", csv_table(COLUMNS, rows))
-    paths = [out / "capture.csv"]
+    return [out / "capture.csv", *save_captures(reports, out / IMAGES)]
+
+
+def save_captures(reports: Sequence[CaptureReport], images: Path) -> list[Path]:
+    """Write a picture for each task and friction limit, ``capture_<task>.png`` without a limit; return the paths."""
+    paths: list[Path] = []
     for task, limit in dict.fromkeys((report.task, report.friction_limit) for report in reports):
         floor = "" if limit == float("inf") else f"_friction_{limit:g}"
-        paths.append(out / IMAGES / f"capture_{task.lower()}{floor}.png")
+        paths.append(images / f"capture_{task.lower()}{floor}.png")
         these = [each for each in reports if (each.task, each.friction_limit) == (task, limit)]
         save_capture(these, paths[-1])
     return paths
