@@ -231,8 +231,10 @@ def evaluate(
     candidates = evaluation.candidates(tasks, [] if ALL in given else given)
     if pictures is not None:
         from .evaluation.leaderboard import save_footprints
+        from .evaluation.plan import make_candidate
 
-        save_footprints(candidates, pictures, seed=seed)
+        made = {each: make_candidate(each, each.folders[0], seed) for each in candidates}
+        save_footprints(made, pictures, seed=seed)
         return
     if out is None:
         found = evaluation.run(candidates)

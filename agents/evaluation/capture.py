@@ -25,7 +25,7 @@ from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.errors import LeanYawError
 from lean_yaw_env.files import write_text
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, STATE_SIZE, Vector
-from lean_yaw_env.rendering.figures import new_figure, save_figure
+from lean_yaw_env.rendering.figures import panels, save_figure
 from lean_yaw_env.validation import require_count, require_number
 from lean_yaw_env.walker import Walker
 
@@ -239,24 +239,17 @@ def _kind(report: CaptureReport) -> NDArray[np.int64]:
 
 def save_capture(reports: Sequence[CaptureReport], path: Path) -> None:
     """Draw where each agent of a task saves states of the plane and where it loses some that could be saved."""
-    columns = min(len(reports), 5)
-    rows = -(-len(reports) // columns)
-    figure = new_figure(2.7 * columns + 0.8, 2.8 * rows + 1.4)
-    axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+    figure, places = panels(len(reports), 5, (2.7, 2.8), (0.8, 1.4), sharex=True, sharey=True)
     colours = ListedColormap([colour for _, colour in _KINDS])
     norm = BoundaryNorm(np.arange(len(_KINDS) + 1) - 0.5, len(_KINDS))
-    for place in axes.flat[len(reports) :]:
-        place.set_axis_off()
-    for place, report in zip(axes.flat, reports, strict=False):
+    for place, report in zip(places, reports, strict=True):
         x, y = report.plane
         place.pcolormesh(x, y, _kind(report).T, cmap=colours, norm=norm)
         place.plot(x.mean(), y.mean(), marker="+", color="black", markersize=9)
         can = report.plane_least_steps <= MOST_STEPS
         place.set_title(f"{report.agent}: {report.plane_is_saved[can].mean():.0%}")
-    for place in axes[-1]:
-        place.set_xlabel("ankle angle (rad)")
-    for place in axes[:, 0]:
-        place.set_ylabel("ankle rate (rad / time unit)")
+        place.set(xlabel="ankle angle (rad)", ylabel="ankle rate (rad / time unit)")
+        place.label_outer()
     limit = reports[0].friction_limit
     floor = "" if limit == float("inf") else f", friction limit {limit:g}"
     figure.suptitle(
