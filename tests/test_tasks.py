@@ -317,10 +317,10 @@ def test_slope_and_friction_replace_the_parameters() -> None:
         ({"sensor_noise": -0.1}, r"sensor_noise must be in \[0, 10\], got -0.1"),
         ({"push_level": 11.0}, r"push_level must be in \[0, 10\], got 11"),
         ({"action_delay": 1}, "action_delay must be True or False, got 1"),
-        ({"hidden_rates": None}, "hidden_rates must be True or False"),
+        ({"hidden_rates": 1}, "hidden_rates must be True or False"),
         (
             {"random_body": "test"},
-            "random_body must be one of training, held-out, got 'test'",
+            "random_body must be one of nominal, training, held-out, got 'test'",
         ),
         ({"random_body": ["training"]}, "random_body must be one of"),
         ({"slope": 1.0}, r"slope must be in \[-0.5, 0.5\], got 1.0"),
