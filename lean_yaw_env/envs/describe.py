@@ -126,7 +126,7 @@ def describe_task(task: Task) -> str:
     for name, command in task.commands.items():
         bounds = f"each in [{command.low:.4g}, {command.high:.4g}]"
         facts.append((f"reset option `{name}`", f"{command.meaning}; {bounds}"))
-    facts.append(("versions", "; ".join(task.history)))
+    facts.append(("versions", " ".join(task.history)))
     parts = [task.summary, table(("", ""), facts)]
     observed = [(f.name, f.unit, f"{f.centre:g}", f"{f.scale:g}", f.meaning) for f in task.observed]
     if observed:

@@ -54,6 +54,10 @@ def observe_nothing(walker: Any, task: Any) -> Any:
     return ()
 
 
+FIRST = "0: the first."
+TO_THE_HORIZON = "the step across the horizon is paid, and counted in metrics, to the horizon alone"
+"""What version 1 changed in every task of the package."""
+
 TASK_RANGES = (
     Range("horizon", 0.0, math.inf, "(]"),
     Range("max_offset_change", 0.0, 2.0),
@@ -117,14 +121,14 @@ class Task:
     name: str
     """The middle of its environment id."""
     reward: Formula
-    """Of a step that was no fall, from records after the step and before ``update``."""
+    """Of a step that was no fall, from records after the step and before ``update``. The environment pays its ``share`` before the horizon."""
     metrics: dict[str, Metric]
     """Success metrics, apart from reward."""
     summary: str
     """For the documents: what the walker must do."""
     reward_text: str
     """For the documents: the reward's rate per unit of time."""
-    history: tuple[str, ...] = ("0: the first.",)
+    history: tuple[str, ...] = (FIRST,)
     """For the documents: a sentence for each version."""
     fields: tuple[Field, ...] = ()
     """The task's record, each field at its initial value before ``start``."""
@@ -163,6 +167,8 @@ class Task:
     """Episodes start in the gait driven by this offset, away from the stance foot; 0 is the gait that the slope drives."""
     headline: str = "return"
     """The metric, or "return", by which agents are compared: it must be meaningful without survival."""
+    is_ranked: bool = True
+    """Whether agents are compared on it; False for a smoke test."""
 
     def __post_init__(self) -> None:
         for name in ("metrics", "commands"):
@@ -174,7 +180,7 @@ class Task:
         require_instance("parameters", self.parameters, WalkerParameters)
         for limits in (*TASK_RANGES, _PUMPING, _GOAL_RADIUS):
             limits.require(getattr(self, limits.name))
-        for name in ("hidden_rates", "slope_varies"):
+        for name in ("hidden_rates", "slope_varies", "is_ranked"):
             require_flag(name, getattr(self, name))
         require_choice("random_body", self.random_body, BODY_DRAWS)
         require_array("body_reach", self.body_reach, (BODY_SIZE,), 0.0, 1.0, "(]")
