@@ -16,14 +16,15 @@ from lean_yaw_env.envs.tasks.headings import (
     heading_features,
     new_heading,
 )
-from lean_yaw_env.envs.tasks.task import Feature
+from lean_yaw_env.envs.tasks.task import FRICTION_LIMIT, NEW, Feature
 from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.kernel.random import uniform
+from lean_yaw_env.parameters import WalkerParameters
 
 # The slope: its mean plus the sum of height sin(wave number x + phase), x downhill.
 WAVES = 3
 SHORTEST_WAVE, LONGEST_WAVE = 8.0, 30.0  # leg lengths
-LEAST_HEIGHT, GREATEST_HEIGHT = 0.004, 0.012  # rad, of all waves together
+LEAST_HEIGHT, GREATEST_HEIGHT = 0.008, 0.016  # rad, of all waves together
 PREVIEWS = (1.0, 2.0, 4.0)  # leg lengths downhill of the walker
 SLOPE_CENTRE, SLOPE_SCALE = 0.01, 0.01  # rad, of the observed slopes
 
@@ -98,7 +99,9 @@ HILLS = replace(
     ),
     summary=f"Walk where you are told, over hills: a heading within {LARGEST_SLOPE_COMMAND} rad of downhill, where the slope varies along the "
     f"way by the sum of {WAVES} waves of random length ({SHORTEST_WAVE:g} to {LONGEST_WAVE:g} leg lengths) and {LEAST_HEIGHT} to "
-    f"{GREATEST_HEIGHT} rad together.",
+    f"{GREATEST_HEIGHT} rad together. The masses may be moved as fast as in Level, to pump.",
+    history=NEW,
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
     max_offset_change=0.1,
     slope_varies=True,
 )

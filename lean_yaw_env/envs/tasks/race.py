@@ -5,9 +5,9 @@ from __future__ import annotations
 from math import tan
 from typing import Any
 
-from lean_yaw_env.envs.formulas import place
+from lean_yaw_env.envs.formulas import ends_in_time, place
 from lean_yaw_env.envs.state import Field
-from lean_yaw_env.envs.tasks.task import Feature, Metric, Task
+from lean_yaw_env.envs.tasks.task import FRICTION_LIMIT, NEW, Feature, Metric, Task
 from lean_yaw_env.envs.tasks.waypoints import (
     BEARING_SCALE,
     DISTANCE_SCALE,
@@ -47,10 +47,16 @@ def race_start(walker: Any, task: Any) -> None:
 
 
 @formula
+def is_beyond(walker: Any, task: Any) -> bool:
+    """Whether the walker has come to the next gate's line, before the horizon."""
+    return ends_in_time(walker) and place(walker)[0].real >= task.goal_x.real
+
+
+@formula
 def is_missed(walker: Any, task: Any) -> bool:
     """Whether the walker has just gone beyond the gate's line, but beside the gate."""
-    x, z = place(walker)
-    return x.real >= task.goal_x.real and abs(z.real - task.goal_z.real) > HALF_WIDTH
+    aside = place(walker)[1] - task.goal_z
+    return is_beyond(walker, task) and abs(aside.real) > HALF_WIDTH
 
 
 @formula
@@ -61,7 +67,7 @@ def race_reward(walker: Any, task: Any) -> Any:
 
 @formula
 def race_update(walker: Any, task: Any) -> bool:
-    if place(walker)[0] >= task.goal_x:
+    if is_beyond(walker, task):
         if is_missed(walker, task):
             task.missed += 1
         else:
@@ -133,8 +139,9 @@ RACE = Task(
     f"rad to either side of it, and {2 * HALF_WIDTH:g} wide. The way downhill until the horizon counts, and a gate that is missed costs "
     f"{MISS_PRICE:g} leg lengths of it. The masses may be moved as fast as in Level, to pump. The next two gates are seen.",
     reward_text=f"{PROGRESS:g} (speed downhill); {MISS_PRICE:g} less for the step that misses a gate",
+    history=NEW,
     goal_fields=("goal_x", "goal_z"),
     goal_radius=HALF_WIDTH,
-    parameters=WalkerParameters(friction_limit=0.6),
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
     max_offset_change=0.1,
 )

@@ -58,6 +58,11 @@ FIRST = "0: the first."
 TO_THE_HORIZON = "the step across the horizon is paid, and counted in metrics, to the horizon alone"
 """What version 1 changed in every task of the package."""
 
+NEW = ("1: the first.",)
+"""The history of a task that came with version 1."""
+FRICTION_LIMIT = 0.6
+"""A rubber sole on a dry hard floor: tables have 0.6 to 0.8."""
+
 TASK_RANGES = (
     Range("horizon", 0.0, math.inf, "(]"),
     Range("max_offset_change", 0.0, 2.0),
