@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from agents import FixedController, RandomController
 from agents.command_line import app
-from agents.evaluation import leaderboard, plan
+from agents.evaluation import plan
 from agents.evaluation.comparison import (
     Claim,
     best_feedback,
@@ -55,12 +55,14 @@ from agents.registry import (
 from agents.seeds import first_seed
 from lean_yaw_env import Walker
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.envs.tasks import TASKS, task_named
+from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.registration import ENV_IDS, TASK_VERSIONS
 from lean_yaw_env.rendering.palette import AGENT_COLOURS
 
 SHORT = EnvOptions(horizon=8.0)
+ENDLESS = "Metastable"
+"""A task that measures the time to a fall."""
 EPISODES = 6
 
 
@@ -112,7 +114,7 @@ def test_every_task_has_a_headline_with_a_direction():
         task = task_named(name)
         if task.headline not in (RETURN, TIME_PER_FALL):
             assert task.metrics[task.headline].better is not None
-    assert is_share("Push", "survived_200_steps") and is_share("Walk", SURVIVAL)
+    assert is_share("WaypointGoal", "is_success") and is_share("Walk", SURVIVAL)
     assert not is_share("Waypoint", "goals")
 
 
@@ -224,7 +226,7 @@ def test_every_agent_has_a_kind_and_is_made_for_its_tasks_alone():
 
 
 def test_learned_agents_are_there_where_a_training_is_found(tmp_path: Path):
-    request = AgentRequest("LeanYaw/Walk-v0", EnvOptions(), path=tmp_path)
+    request = AgentRequest("LeanYaw/Walk-v1", EnvOptions(), path=tmp_path)
     assert "ppo" in names_for(request)
     quick = make_all(replace(request, path=None, runs=tmp_path), ("baseline",))
     assert list(quick) == ["random", "fixed"]
@@ -292,25 +294,17 @@ def test_two_processes_give_the_results_of_one(monkeypatch):
         assert np.array_equal(one.values(RETURN), two.values(RETURN))
 
 
-@pytest.fixture
-def endless(monkeypatch) -> str:
-    """A task that measures the time to a fall."""
-    monkeypatch.setitem(TASKS, "Push", replace(task_named("Push"), headline=TIME_PER_FALL))
-    monkeypatch.setattr(leaderboard, "LEVELS_TASK", "Push")
-    return "Push"
-
-
-def test_push_levels_are_walked_by_the_agents_of_one_task_alone(endless: str):
-    own = Candidate(endless, "fixed", EPISODES, SHORT)
+def test_push_levels_are_walked_by_the_agents_of_one_task_alone():
+    own = Candidate(ENDLESS, "fixed", EPISODES, SHORT)
     candidates = level_candidates([own, Candidate("Walk", "fixed", EPISODES, SHORT)], (0.1, 2.0))
     assert [each.options.push_level for each in candidates] == [0.1, 2.0]
     rows = level_rows(run_all([own, *candidates]))
-    assert list(rows) == sorted([0.1, task_named(endless).push_level, 2.0])
+    assert list(rows) == sorted([0.1, task_named(ENDLESS).push_level, 2.0])
     assert all(row.metric == TIME_PER_FALL for of_level in rows.values() for row in of_level)
 
 
-def test_the_time_per_fall_is_that_of_the_episodes(endless: str):
-    (found,) = run_all([Candidate(endless, "fixed", 40, EnvOptions(horizon=60.0))])
+def test_the_time_per_fall_is_that_of_the_episodes():
+    (found,) = run_all([Candidate(ENDLESS, "fixed", 40, EnvOptions(horizon=60.0))])
     times, fell = found.values(TIME)[0], found.values(FELL)[0]
     assert 0 < fell.sum() < 40
     assert np.array_equal(fell == 1.0, found.values(SURVIVAL)[0] == 0.0)
@@ -320,40 +314,42 @@ def test_the_time_per_fall_is_that_of_the_episodes(endless: str):
     assert row.low < row.mean < row.high and row.episodes == 40
 
 
-def test_walks_until_a_fall_are_cut_sooner_than_their_task_cuts_them(endless: str):
+def test_walks_until_a_fall_are_cut_sooner_than_their_task_cuts_them():
     evaluation = Evaluation(episodes=1000, progress=False)
-    (own,) = evaluation.candidates([endless], ["lqr"])
+    (own,) = evaluation.candidates([ENDLESS], ["lqr"])
     assert (own.episodes, own.options.horizon) == (plan.LONG_EPISODES, plan.LONG_HORIZON)
-    assert evaluation.candidates([endless], ["mpc"])[0].episodes == plan.LONG_COSTLY_EPISODES
+    assert evaluation.candidates([ENDLESS], ["mpc"])[0].episodes == plan.LONG_COSTLY_EPISODES
     (other,) = evaluation.candidates(["Walk"], ["lqr"])
     assert (other.episodes, other.options) == (1000, EnvOptions())
     given = Evaluation(options=SHORT, progress=False)
-    assert given.candidates([endless], ["lqr"])[0].options == SHORT
+    assert given.candidates([ENDLESS], ["lqr"])[0].options == SHORT
 
 
 def fallen(agent: str, mean: float, episodes: int = 60, trainings: int = 1) -> Results:
     """Walks of an agent that falls after a mean time, cut at 100; of an infinite one, never."""
     times = np.random.default_rng(1).exponential(1.0, (trainings, episodes)) * mean
     fell = (times < 100.0).astype(float)
-    return walked("Push", agent, np.minimum(times, 100.0), time=np.minimum(times, 100.0), fell=fell)
+    return walked(
+        ENDLESS, agent, np.minimum(times, 100.0), time=np.minimum(times, 100.0), fell=fell
+    )
 
 
-def test_who_falls_less_often_is_better_however_few_fall(endless: str):
-    results = {endless: named(*(fallen(*each) for each in (("lqr", 50.0), ("ppo", 200.0), ("sac", np.inf))))}  # fmt: skip
-    claims = {each.better: each for each in claims_of(results, {endless: "lqr"})}
+def test_who_falls_less_often_is_better_however_few_fall():
+    results = {ENDLESS: named(*(fallen(*each) for each in (("lqr", 50.0), ("ppo", 200.0), ("sac", np.inf))))}  # fmt: skip
+    claims = {each.better: each for each in claims_of(results, {ENDLESS: "lqr"})}
     assert claims["ppo"].holds and claims["sac"].holds
     assert claims["ppo"].comparison.mean.value == pytest.approx(np.log10(4.0), abs=0.2)
     assert np.isfinite(claims["sac"].comparison.mean).all()
-    few = {endless: named(fallen("lqr", 5000.0), fallen("ppo", np.inf))}
-    fell = few[endless]["lqr"].values(FELL).sum()
+    few = {ENDLESS: named(fallen("lqr", 5000.0), fallen("ppo", np.inf))}
+    fell = few[ENDLESS]["lqr"].values(FELL).sum()
     assert 0 < fell < 5  # too few to say anything
-    assert claims_of(few, {endless: "lqr"})[0].verdict == "tie"
+    assert claims_of(few, {ENDLESS: "lqr"})[0].verdict == "tie"
     assert best_feedback(named(fallen("lqr", 50.0), fallen("feedback", 20.0))) == "lqr"
 
 
-def test_an_agent_that_never_falls_has_a_bound_and_no_infinity_anywhere(endless: str, tmp_path):
-    results = {endless: named(fallen("lqr", 50.0), fallen("ppo", np.inf, trainings=2))}
-    rows, claims = compared_rows(results, {endless: "lqr"})
+def test_an_agent_that_never_falls_has_a_bound_and_no_infinity_anywhere(tmp_path):
+    results = {ENDLESS: named(fallen("lqr", 50.0), fallen("ppo", np.inf, trainings=2))}
+    rows, claims = compared_rows(results, {ENDLESS: "lqr"})
     page = leaderboard_page(rows, claims, {0.5: rows[:1]}, {}, "Made by a test.")
     bound = np.log10(2 * 60 * 100.0 / -np.log(0.025))
     assert f"| ≥ {bound:.3f} |" in page and "log10 time per fall ↑" in page
@@ -405,11 +401,9 @@ def test_every_agent_has_a_colour_of_its_own():
     assert len({agent_colour(name) for name in AGENTS}) == len(AGENTS)
 
 
-def test_the_leaderboard_holds_every_agent_and_the_command_that_made_it(
-    tmp_path: Path, endless: str
-):
+def test_the_leaderboard_holds_every_agent_and_the_command_that_made_it(tmp_path: Path):
     evaluation = Evaluation(episodes=4, options=SHORT, cache=tmp_path / "kept", progress=False)
-    candidates = evaluation.candidates(["Walk", "Push"], ["random", "fixed"])
+    candidates = evaluation.candidates(["Walk", "Metastable"], ["random", "fixed"])
     rows, _ = make_leaderboard(
         candidates, evaluation, tmp_path / "docs", "make it", starts=8, points=3
     )
@@ -417,15 +411,21 @@ def test_the_leaderboard_holds_every_agent_and_the_command_that_made_it(
     assert page.startswith("# Leaderboard\n\nThis page is generated by `make it`")
     cells = [line.split("|")[-3].strip() for line in page.splitlines() if "| baseline |" in line]
     assert cells[0] == "" and 0.0 <= float(cells[1].rstrip("%")) <= 100.0  # random draws, fixed not
-    for words in ("## Walk", "## Push", "| random | baseline |", "random < fixed", "| 0.5 | 0.7"):
+    for words in (
+        "## Walk",
+        "## Metastable",
+        "| random | baseline |",
+        "random < fixed",
+        "| 0.5 | 0.7",
+    ):
         assert words in page
     with open(tmp_path / "docs" / "leaderboard.csv", newline="") as file:
         assert len(list(csv.DictReader(file))) == len(rows)
     images = {path.name for path in (tmp_path / "docs" / "images").iterdir()}
     assert images == {
-        "leaderboard.png", "push_levels.png", "footprints_walk.png", "footprints_push.png", "capture_walk.png", "capture_push.png"
+        "leaderboard.png", "push_levels.png", "footprints_walk.png", "footprints_push.png", "capture_walk.png", "capture_metastable.png"
     }  # fmt: skip
-    assert "(images/capture_push.png)" in page
+    assert "(images/capture_metastable.png)" in page
 
 
 def test_a_page_says_plainly_what_does_not_hold():

@@ -30,6 +30,7 @@ from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.registration import ENV_IDS, TASK_VERSIONS
 
 TASKS = tuple(TASK_VERSIONS)
+COMMANDED = [name for name in TASKS if "command_left" in task_named(name).initial.dtype.names]
 BODY = ("hip_width", "foot_radius", "ankle_tilt", "slope")
 HARD = {
     "none": {},
@@ -136,17 +137,51 @@ def test_a_step_that_takes_no_time_leaves_numbers_numbers(task: str) -> None:
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_the_horizon_is_simulated_time_and_truncates(task: str) -> None:
-    env = WalkerEnv(task, horizon=3.0, push_level=0.0, start_disturbance=0.0)
-    env.reset(seed=0)
-    time = 0.0
+def test_rewards_and_sums_count_to_the_horizon_and_no_further(task: str) -> None:
+    env, longer = (
+        WalkerEnv(task, horizon=horizon, push_level=0.0, start_disturbance=0.0)
+        for horizon in (3.0, 300.0)
+    )
+    for each in (env, longer):
+        each.reset(seed=0)
     truncated = terminated = False
     while not (truncated or terminated):
-        before = time
-        _, _, terminated, truncated, info = env.step(ZERO)
-        time = info["time"]
-    assert truncated
-    assert before < 3.0 <= time
+        before = env.simulation.walkers[0].copy()
+        _, reward, terminated, truncated, info = env.step(ZERO)
+        _, whole, _, _, onward = longer.step(ZERO)
+    assert truncated and not terminated
+    assert before["time"] < 3.0 < onward["time"]
+    assert info["time"] == 3.0
+    assert info["duration"] == onward["duration"]
+    share = (3.0 - before["time"]) / info["duration"]
+    assert reward == pytest.approx(share * whole, abs=1e-15)
+    advance = onward["distance"] - before["distance"]
+    assert info["distance"] == pytest.approx(before["distance"] + share * advance, abs=1e-12)
+
+
+@pytest.mark.parametrize("task", COMMANDED)
+def test_commands_come_at_times_that_do_not_depend_on_the_steps(task: str) -> None:
+    schedules = []
+    for angle in (-0.3, 0.3):  # short and long steps
+        env = WalkerEnv(task, push_level=0.0, start_disturbance=0.0, random_body="nominal")
+        env.reset(seed=0)
+        record, schedule, due = env.simulation.tasks, [], 0.0
+        action = np.array([angle, 0.6 if env.task.pumping else 0.0], dtype=np.float32)
+        truncated = terminated = False
+        time = before = 0.0
+        while not (truncated or terminated):
+            if record["since_command"][0] == 0.0:
+                assert before <= due <= time
+                due = time + float(record["command_left"][0])
+                schedule.append((due, float(record["command"][0])))
+            before = time
+            *_, terminated, truncated, info = env.step(action)
+            time = info["time"]
+        assert truncated
+        schedules.append(schedule)
+    # sums of about 200 steps' durations
+    np.testing.assert_allclose(*schedules, rtol=0.0, atol=1e-11)
+    assert len(schedules[0]) > 3
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -317,10 +352,10 @@ def test_slope_and_friction_replace_the_parameters() -> None:
         ({"sensor_noise": -0.1}, r"sensor_noise must be in \[0, 10\], got -0.1"),
         ({"push_level": 11.0}, r"push_level must be in \[0, 10\], got 11"),
         ({"action_delay": 1}, "action_delay must be True or False, got 1"),
-        ({"hidden_rates": None}, "hidden_rates must be True or False"),
+        ({"hidden_rates": 1}, "hidden_rates must be True or False"),
         (
             {"random_body": "test"},
-            "random_body must be one of training, held-out, got 'test'",
+            "random_body must be one of nominal, training, held-out, got 'test'",
         ),
         ({"random_body": ["training"]}, "random_body must be one of"),
         ({"slope": 1.0}, r"slope must be in \[-0.5, 0.5\], got 1.0"),
@@ -512,7 +547,7 @@ def test_slalom_ends_three_leg_lengths_off_the_path_without_reward() -> None:
 def test_harder_pushes_end_walks_sooner() -> None:
     steps = []
     for level in (0.2, 0.4, 0.8):
-        envs = started("Push", 64, push_level=level)
+        envs = started("Metastable", 64, push_level=level)
         walked = np.zeros(64)
         alive = np.ones(64, dtype=bool)
         for _ in range(100):
@@ -521,16 +556,6 @@ def test_harder_pushes_end_walks_sooner() -> None:
             walked += alive
         steps.append(walked.mean())
     assert steps[0] > steps[1] + 10.0 > steps[2] + 20.0
-
-
-def test_push_counts_two_hundred_steps() -> None:
-    env = WalkerEnv("Push", push_level=0.0, start_disturbance=0.0)
-    env.reset(seed=0)
-    for _ in range(199):
-        *_, info = env.step(ZERO)
-    assert info["survived_200_steps"] == 0.0
-    *_, info = env.step(ZERO)
-    assert info["survived_200_steps"] == 1.0
 
 
 @pytest.mark.parametrize("slope", [0.0, -0.005])

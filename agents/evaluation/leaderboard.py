@@ -79,7 +79,7 @@ def make_leaderboard(
     starts: int = 1024,
     points: int = 61,
 ) -> tuple[list[Row], list[Results]]:
-    """Evaluate agents at their tasks, and Push's at other levels, and write page, numbers and pictures into a folder.
+    """Evaluate agents at their tasks, and Metastable's at other levels, and write page, numbers and pictures into a folder.
 
     Return the rows and the candidates' results at the tasks as they are.
 
