@@ -20,7 +20,7 @@ from ..agent import Agent
 from ..policies.policy import package_versions
 from ..registry import AGENTS
 from ..seeds import first_seed
-from .capture import MOST_STEPS, CaptureReport, examine_capture, save_captures
+from .capture import MOST_STEPS, CaptureReport, examine_capture, picture_name, save_captures
 from .comparison import ENTERED, Claim, by_task, compared_rows, kind_of, rivals_of
 from .episodes import SURVIVAL, TIME_PER_FALL, Results, Row, direction, is_share, metric_row, words
 from .intervals import CLAIM_RESAMPLES, CONFIDENCE, RESAMPLES
@@ -220,8 +220,9 @@ def leaderboard_page(
             f"![Footprints of all agents in the same episode](images/footprints_{task.lower()}.png)",
         ]
         if any(each == task for each, _ in saved):
-            picture = f"{IMAGES}/capture_{task.lower()}.png"
-            parts.append(f"![Where each agent saves and loses states]({picture})")
+            parts.append(
+                f"![Where each agent saves and loses states]({IMAGES}/{picture_name(task)})"
+            )
     if levels:
         parts += [
             f"## {LEVELS_TASK} at other push levels",
