@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lean_yaw_env.envs.tasks.headings import HEADING, LEVEL, SPEED_HEADING, UTURN
+from lean_yaw_env.envs.tasks.headings import HEADING, LEVEL, LEVEL_UPHILL, SPEED_HEADING, UTURN
 from lean_yaw_env.envs.tasks.slalom import SLALOM
 from lean_yaw_env.envs.tasks.task import Command, Feature, Formula, Metric, Task
 from lean_yaw_env.envs.tasks.walking import PUSH, WALK
@@ -12,7 +12,18 @@ from lean_yaw_env.validation import require_instance, suggestion
 
 TASKS = {
     task.name: task
-    for task in (HEADING, WALK, SPEED_HEADING, WAYPOINT, SLALOM, PUSH, UTURN, LEVEL, WAYPOINT_GOAL)
+    for task in (
+        HEADING,
+        WALK,
+        SPEED_HEADING,
+        WAYPOINT,
+        SLALOM,
+        PUSH,
+        UTURN,
+        LEVEL,
+        LEVEL_UPHILL,
+        WAYPOINT_GOAL,
+    )
 }
 """Those of this package and of others (``register_task``)."""
 

@@ -42,7 +42,9 @@ def observe_nothing(walker: Any, task: Any) -> Any:
 
 
 FIRST = "0: the first."
-TO_THE_HORIZON = "the step across the horizon is paid, and counted in metrics, to the horizon alone"
+FLOOR = 0.6
+"""Friction limit of the tasks of this package: the least that tables give for rubber on dry concrete, 0.6 to 0.85."""
+SINCE_VERSION_1 = f"the friction limit is {FLOOR}; the step across the horizon is paid, and counted in metrics, to the horizon alone"
 """What version 1 changed in every task of the package."""
 
 TASK_RANGES = (

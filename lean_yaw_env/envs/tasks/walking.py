@@ -7,8 +7,9 @@ from typing import Any
 
 from lean_yaw_env.envs.dynamics import ANKLE_PUSH, PITCH_PUSH
 from lean_yaw_env.envs.state import Field
-from lean_yaw_env.envs.tasks.task import FIRST, TO_THE_HORIZON, Metric, Task
+from lean_yaw_env.envs.tasks.task import FIRST, FLOOR, SINCE_VERSION_1, Metric, Task
 from lean_yaw_env.kernel.compilation import formula
+from lean_yaw_env.parameters import WalkerParameters
 
 # Reward per unit of time: for walking, and against large actions.
 WALKING_RATE = 1.0
@@ -31,7 +32,8 @@ WALK = Task(
     },
     summary="Keep walking; nothing is commanded. A smoke test, which ranks nobody.",
     reward_text=f"{WALKING_RATE} - {EFFORT_RATE} effort",
-    history=(FIRST, f"1: {TO_THE_HORIZON}."),
+    history=(FIRST, f"1: {SINCE_VERSION_1}."),
+    parameters=WalkerParameters(friction_limit=FLOOR),
     is_ranked=False,
 )
 
