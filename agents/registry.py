@@ -190,7 +190,8 @@ def env_id_of(task: str) -> str:
 def newest_policy(env_id: str, runs: Path, algorithm: str = DEFAULT_ALGORITHM) -> Path | None:
     """The folder of an algorithm's policy for an environment that was written last under ``runs``, if there is any."""
     found: list[tuple[float, Path]] = []
-    for card in runs.rglob(CARD_FILE):
+    # a run's folder, or that of one seed of a series; what else is below, as evaluations, is not searched
+    for card in (*runs.glob(f"*/{CARD_FILE}"), *runs.glob(f"*/seed*/{CARD_FILE}")):
         try:
             values = read_json(card)
         except ValueError:

@@ -60,6 +60,7 @@ class Training:
     checkpoint_seconds : least time between two checkpoints
     tensorboard : write TensorBoard's logs too
     algorithm : a name in ``ALGORITHMS``
+    is_compared : evaluate and draw the baselines and feedback controllers too
     """
 
     env_id: str
@@ -71,6 +72,7 @@ class Training:
     checkpoint_seconds: float = 5.0
     tensorboard: bool = False
     algorithm: str = "ppo"
+    is_compared: bool = True
 
     def __post_init__(self) -> None:
         training_seed(self.seed)
@@ -81,7 +83,8 @@ class Training:
         require_count("episodes", self.episodes, 1, MOST_EPISODES)
         require_count("threads", self.threads, 1, 1024)
         require_number("checkpoint_seconds", self.checkpoint_seconds, 0.0, math.inf)
-        require_flag("tensorboard", self.tensorboard)
+        for name in ("tensorboard", "is_compared"):
+            require_flag(name, getattr(self, name))
 
     @classmethod
     def of_task(
@@ -218,7 +221,8 @@ def _run(folder: Path, training: Training, progress: bool, report: Report | None
     _write_statistics(folder, policy)
     log.write(folder / LOG_FILE)
     request = AgentRequest(training.env_id, training.options, seed=training.seed)
-    agents = make_all(request, ("baseline", "feedback")) | {training.algorithm: policy}
+    others = make_all(request, ("baseline", "feedback")) if training.is_compared else {}
+    agents = others | {training.algorithm: policy}
     total = training.episodes * len(agents)
     with tqdm(total=total, desc="evaluating", unit="episode", disable=not progress) as bar:
         rows = evaluate(

@@ -12,6 +12,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 from torch.optim import Optimizer
@@ -95,6 +96,8 @@ class StableBaselinesLearner:
             seed=seed,
             device="cpu",
         )
+        if tensorboard is None:  # SB3's own logger makes a folder among the temporary files
+            self.model.set_logger(Logger(folder=None, output_formats=[]))
         self._walkers.seed(first)  # in place of the policy's seed, which SB3 gives them too
         # what SB3 has from the first step on, so that a state has the same parts before it
         self.model._last_obs = self.model._last_original_obs = self._no_observations()
