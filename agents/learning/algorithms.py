@@ -20,9 +20,11 @@ from ..settings import tuned
 from .apg import GradientLearner, GradientSettings
 from .her import HERLearner, HERSettings
 from .learner import Learner, LearnerSettings, settings_to_plain
-from .ppo import PPOLearner, PPOSettings
+from .ppo import FramesSettings, PPOLearner, PPOSettings
 from .recorder import CheckpointError, Recorder, Report, TrainingLog
+from .recurrent import RecurrentLearner, RecurrentSettings
 from .sac import SACLearner, SACSettings
+from .tqc import TQCLearner, TQCSettings
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,9 @@ class Algorithm:
 _TASKS = tuple(TASK_VERSIONS)
 ALGORITHMS: dict[str, Algorithm] = {
     "ppo": Algorithm(PPOSettings, PPOLearner, shipped=_TASKS, seeds=10),
+    "recurrent": Algorithm(RecurrentSettings, RecurrentLearner, _TASKS),
+    "frames": Algorithm(FramesSettings, PPOLearner, _TASKS),
+    "tqc": Algorithm(TQCSettings, TQCLearner, _TASKS),
     "sac": Algorithm(SACSettings, SACLearner, shipped=("Push",)),
     "apg": Algorithm(
         GradientSettings, GradientLearner, _TASKS, shipped=("Heading", "SpeedHeading", "Slalom")
