@@ -384,7 +384,7 @@ def capture(
     from .evaluation.capture import examine_captures, show, write_captures
 
     reports, notes = examine_captures(
-        tasks_in(task or ["Push"]), names_in([agents]), path=agent_path, runs=runs,
+        tasks_in(task or ["Metastable"]), names_in([agents]), path=agent_path, runs=runs,
         starts=starts, points=points, friction_limits=friction_limit or [float("inf")],
     )  # fmt: skip
     if as_json:

@@ -101,10 +101,13 @@ def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
     return made
 
 
+_STEERED = ("Heading", "SpeedHeading", "UTurn", "Level", "Energy", "UnknownBody", "Hills")
+"""Tasks that command a heading."""
+
 AGENTS: dict[str, AgentEntry] = {
     "random": AgentEntry("baseline", lambda asked: RandomController(asked.seed, _layout(asked))),
     "fixed": AgentEntry("baseline", lambda asked: FixedController(_layout(asked))),
-    "feedback": AgentEntry("feedback", _feedback, ("Heading", "SpeedHeading", "UTurn", "Level")),
+    "feedback": AgentEntry("feedback", _feedback, _STEERED),
     "lqr": AgentEntry("feedback", _lqr),
     "mpc": AgentEntry("planner", _mpc, tuple(TASK_VERSIONS)),
     "ppo": AgentEntry("learned", _trained("ppo")),

@@ -37,7 +37,7 @@ from lean_yaw_env.parameters import MIRROR
 WEIGHTS = LqrWeights()
 RAW = EnvOptions(mirror=False)
 MIDDLE = int(np.argmin(np.abs(np.array(ANGLES) - 0.3)))
-TASKS = ("Heading", "SpeedHeading", "Push", "Slalom", "Waypoint", "Level", "UTurn")
+TASKS = ("Heading", "SpeedHeading", "Metastable", "Slalom", "Waypoint", "Level", "UTurn")
 AGENTS_BY_TASK = {task: guided(task, EnvOptions()) for task in TASKS}
 
 
@@ -244,7 +244,7 @@ def test_the_gait_itself_is_answered_by_its_own_command():
         # means over 1,000 held-out episodes in brackets; 24 episodes stray from them by a tenth or so
         ("Heading", "settled_fraction", 0.8),  # (0.87)
         ("SpeedHeading", "settled_fraction", 0.6),  # (0.71)
-        ("Push", "survived_200_steps", 0.7),  # (0.91)
+        ("Metastable", "survived_200_steps", 0.7),  # (0.91)
         ("Waypoint", "goals", 5.0),  # (6.1)
         ("Level", "settled_fraction", 0.7),  # (0.81)
         ("UTurn", "settled_fraction", 0.5),  # (0.6)

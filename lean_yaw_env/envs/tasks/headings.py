@@ -7,8 +7,18 @@ from math import pi
 from typing import Any
 
 from lean_yaw_env.envs.formulas import closeness, counted_time, mean_heading, positive, wrapped
+from lean_yaw_env.envs.reset import BODY_DEVIATIONS
 from lean_yaw_env.envs.state import Field
-from lean_yaw_env.envs.tasks.task import FIRST, TO_THE_HORIZON, Command, Feature, Metric, Task
+from lean_yaw_env.envs.tasks.task import (
+    FIRST,
+    FRICTION_LIMIT,
+    NEW,
+    TO_THE_HORIZON,
+    Command,
+    Feature,
+    Metric,
+    Task,
+)
 from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.kernel.random import uniform
 from lean_yaw_env.parameters import WalkerParameters
@@ -265,4 +275,16 @@ LEVEL = replace(
     parameters=WalkerParameters(slope=0.0),
     max_offset_change=0.1,
     pumping=PUMPING,
+)
+
+UNKNOWN_BODY = replace(
+    HEADING,
+    name="UnknownBody",
+    summary="Heading with a body that you do not know: drawn anew for each episode from a box twice as wide as that of other tasks, and with both "
+    "rates hidden. It must be learned from how the walker moves, in memory of past observations; an oracle sees it (`show_body=True`).",
+    history=NEW,
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
+    hidden_rates=True,
+    random_body="training",
+    body_reach=tuple(2.0 * reach for reach in BODY_DEVIATIONS),
 )
