@@ -60,7 +60,7 @@ def train(
     seed: Annotated[int | None, Option(help="Random seed; 0 by default.")] = None,
     seeds: Annotated[str | None, Option(help="Several seeds instead of one, a run for each: 0-4, or 5 for the same, or 0,3,7.")] = None,
     jobs: Annotated[int, Option(min=1, help="Number of processes for several seeds.")] = 1,
-    algorithm: Annotated[str | None, Option(help="ppo, sac, apg or, for WaypointGoal, her; ppo otherwise.")] = None,
+    algorithm: Annotated[str | None, Option(help="ppo, frames, recurrent, sac, tqc, apg, for UnknownBody oracle or for WaypointGoal her; ppo otherwise.")] = None,
     steps: Annotated[int | None, Option(help="Walking steps to train for, over all walkers; the task's own number otherwise.")] = None,
     episodes: Annotated[int | None, Option(help="Evaluation episodes of each agent; 1000 by default.")] = None,
     out: Annotated[Path, Option(help="Where runs leave their folders.")] = Path("runs"),

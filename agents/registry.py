@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.errors import NoGaitError
@@ -65,11 +65,19 @@ class AgentRequest:
 
 @dataclass(frozen=True)
 class AgentEntry:
-    """An agent of the registry: its kind, what makes it for a request, and the names of the tasks that it is for."""
+    """An agent of the registry: its kind, what makes it for a request, the names of the tasks that it is for, and options that it needs.
+
+    These options hold in the place of the environment's: an oracle walks in an environment that shows what others must find out.
+    """
 
     kind: Kind
     make: Callable[[AgentRequest], Agent]
     tasks: tuple[str, ...] = ALL_TASKS
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def needed_options(self, options: EnvOptions) -> EnvOptions:
+        """Options of the environment with those that the agent needs."""
+        return replace(options, **self.options)
 
 
 def _layout(request: AgentRequest) -> ObservationLayout:
@@ -113,6 +121,10 @@ AGENTS: dict[str, AgentEntry] = {
     "ppo": AgentEntry("learned", _trained("ppo")),
     "sac": AgentEntry("learned", _trained("sac")),
     "apg": AgentEntry("learned", _trained("apg")),
+    "tqc": AgentEntry("learned", _trained("tqc")),
+    "frames": AgentEntry("learned", _trained("frames")),
+    "recurrent": AgentEntry("learned", _trained("recurrent")),
+    "oracle": AgentEntry("learned", _trained("oracle"), ("UnknownBody",), {"show_body": True}),
     "her": AgentEntry("learned", _trained("her"), (GOAL_TASK,)),
 }
 """Every agent, in the order of tables; a learned one has the name of its algorithm."""

@@ -25,6 +25,7 @@ from .learning.series import (
 )
 from .policies import policy_files
 from .policies.policy_files import load, save, shipping_folder
+from .registry import agent_entry
 from .settings import all_settings, keep_settings, with_values
 from .tuning.spaces import space_of
 
@@ -133,7 +134,7 @@ def _ship_policy(run: Path, replace: bool) -> Path:
     if not evaluation.exists():
         raise ValueError(f"the run in {str(run)!r} is not finished")
     rows = [row for row in read_json(evaluation) if row["agent"] == card.algorithm]
-    if card.options != EnvOptions():
+    if card.options != agent_entry(card.algorithm).needed_options(EnvOptions()):
         raise ValueError(
             f"options of {str(run)!r} must be the environment's own, got {card.options}"
         )

@@ -56,15 +56,17 @@ class Algorithm:
 
 
 _TASKS = tuple(TASK_VERSIONS)
+_UNKNOWN = ("UnknownBody",)
 ALGORITHMS: dict[str, Algorithm] = {
     "ppo": Algorithm(PPOSettings, PPOLearner, shipped=_TASKS, seeds=10),
-    "recurrent": Algorithm(RecurrentSettings, RecurrentLearner, _TASKS),
-    "frames": Algorithm(FramesSettings, PPOLearner, _TASKS),
-    "tqc": Algorithm(TQCSettings, TQCLearner, _TASKS),
-    "sac": Algorithm(SACSettings, SACLearner, shipped=("Push",)),
+    "sac": Algorithm(SACSettings, SACLearner, shipped=("Metastable",)),
     "apg": Algorithm(
         GradientSettings, GradientLearner, _TASKS, shipped=("Heading", "SpeedHeading", "Slalom")
     ),
+    "tqc": Algorithm(TQCSettings, TQCLearner),
+    "frames": Algorithm(FramesSettings, PPOLearner, shipped=_UNKNOWN),
+    "recurrent": Algorithm(RecurrentSettings, RecurrentLearner, shipped=_UNKNOWN),
+    "oracle": Algorithm(PPOSettings, PPOLearner, _UNKNOWN, shipped=_UNKNOWN),
     "her": Algorithm(HERSettings, HERLearner, (GOAL_TASK,), shipped=(GOAL_TASK,), seeds=1),
 }
 """By the names that their policies carry."""

@@ -28,7 +28,7 @@ from ..policies.policy_files import (
     save,
     task_of,
 )
-from ..registry import AgentRequest, env_id_of, make_all
+from ..registry import AgentRequest, agent_entry, env_id_of, make_all
 from ..seeds import MOST_EPISODES, first_seed, training_seed
 from ..settings import with_values
 from .algorithms import ALGORITHMS, algorithm_for, settings_for, train
@@ -107,7 +107,9 @@ class Training:
         settings = settings_for(others.get("algorithm", cls.algorithm), task)
         if steps is not None:
             settings = replace(settings, steps=steps)
-        return cls(env_id, seed, settings, options or EnvOptions(), **others)
+        agent = agent_entry(others.get("algorithm", cls.algorithm))
+        needed = agent.needed_options(options or EnvOptions())
+        return cls(env_id, seed, settings, needed, **others)
 
     @property
     def task(self) -> str:
