@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -134,7 +135,7 @@ def test_planning_alone_steers():
 
 
 def test_fewer_scenarios_than_kept_already_stay_up_longer_under_pushes_than_the_fixed_controller():
-    options = EnvOptions(horizon=60.0)
+    options = EnvOptions(horizon=60.0, friction_limit=math.inf)
     planner = MpcController(
         "Metastable", options, replace(tuned("mpc", "Metastable", MpcSettings()), scenarios=4)
     )

@@ -441,15 +441,20 @@ def test_speed_heading_reports_both_errors() -> None:
     assert info["mean_absolute_speed_error"] == pytest.approx(speed / time, abs=1e-12)
 
 
-def test_goals_are_set_all_round_and_at_their_distance() -> None:
-    simulation = started("Waypoint", 2000, start_disturbance=0.0).simulation
+@pytest.mark.parametrize(
+    ("task", "nearest", "farthest"), [("Waypoint", 4.0, 8.0), ("WaypointGoal", 8.0, 16.0)]
+)
+def test_goals_are_set_all_round_and_at_their_distance(
+    task: str, nearest: float, farthest: float
+) -> None:
+    simulation = started(task, 2000, start_disturbance=0.0).simulation
     aside = 0.5 * 0.3 * simulation.walkers["side"]  # the walker's middle, at heading ~ 0
     x = simulation.tasks["goal_x"]
     z = simulation.tasks["goal_z"] - aside
     distance = np.hypot(x, z)
     # the gait's footprints head 0.0015 rad to one side, which moves the middle by 0.0003
-    assert 8.0 - 1e-3 < distance.min() < 8.1
-    assert 15.9 < distance.max() < 16.0 + 1e-3
+    assert nearest - 1e-3 < distance.min() < nearest + 0.1
+    assert farthest - 0.1 < distance.max() < farthest + 1e-3
     quarters = np.histogram(np.arctan2(z, x), bins=4, range=(-np.pi, np.pi))[0]
     assert np.all(np.abs(quarters - 500) < 6 * math.sqrt(500))
 
@@ -475,7 +480,7 @@ def test_approaching_pays_and_reaching_sets_another_goal() -> None:
             assert info["goal_distance"] > waypoints.RADIUS
     # at most 3 - 0.5 away, in steps of 0.3
     assert 8 <= info["steps"] <= 10
-    assert 8.0 <= info["goal_distance"] <= 16.0
+    assert 4.0 <= info["goal_distance"] <= 8.0
 
 
 def test_where_the_slope_turns_the_heading_is_not_shown() -> None:
@@ -558,9 +563,9 @@ def test_harder_pushes_end_walks_sooner() -> None:
     assert steps[0] > steps[1] + 10.0 > steps[2] + 20.0
 
 
-@pytest.mark.parametrize("slope", [0.0, -0.005])
-def test_level_starts_in_the_gait_of_pumping(slope: float) -> None:
-    env = WalkerEnv("Level", slope=slope, start_disturbance=0.0)
+@pytest.mark.parametrize("task", ["Level", "LevelUphill"])
+def test_level_starts_in_the_gait_of_pumping(task: str) -> None:
+    env = WalkerEnv(task, start_disturbance=0.0)
     first, _ = env.reset(seed=0)
     for _ in range(6):
         observation, _, _, _, info = env.step(np.array([0.0, 0.6], dtype=np.float32))
@@ -573,24 +578,24 @@ def test_level_starts_in_the_gait_of_pumping(slope: float) -> None:
 def pumping(observations: np.ndarray, steering: float) -> np.ndarray:
     """Alternate the offset away from the stance foot, more or less of it by the heading error."""
     actions = np.zeros((len(observations), 2), np.float32)
-    actions[:, 1] = 0.6 - steering * observations[:, -1]
+    actions[:, 1] = 0.4 - steering * observations[:, -1]
     return actions
 
 
-@pytest.mark.parametrize("slope", [0.0, -0.005])
-def test_level_is_walked_and_steered_by_pumping_alone(slope: float) -> None:
+@pytest.mark.parametrize("task", ["Level", "LevelUphill"])
+def test_level_is_walked_and_steered_by_pumping_alone(task: str) -> None:
     n = 32
     errors = []
-    for steering in (0.0, 0.6):
-        envs = started("Level", n, slope=slope)
-        for _ in range(300):  # of 0.5 to 0.55 units of time, within the horizon
+    for steering in (0.0, 0.2):
+        envs = started(task, n)
+        for _ in range(180):  # of 0.5 to 1 units of time, within the horizon
             _, _, terminated, truncated, info = envs.step(
                 pumping(envs.simulation.observations, steering)
             )
             assert not terminated.any()
             assert not truncated.any()
         errors.append(info["mean_absolute_heading_error"].mean())
-    # measured over 256 whole episodes: 0.31 to 0.36 straight on, 0.15 to 0.17 steered
+    # measured: 0.33 straight on and 0.23 steered on the level, 0.42 and 0.25 uphill
     assert errors[1] < 0.75 * errors[0]
 
 

@@ -161,9 +161,10 @@ class Evaluation:
         return found
 
     def _of_registry(self, name: str, task: str, request: AgentRequest) -> Candidate:
-        is_learned = agent_entry(name).kind == "learned"
-        folders = policy_folders(name, request) if is_learned else []
-        return self._candidate(name, task, tuple(folders) or (None,))
+        entry = agent_entry(name)
+        folders = policy_folders(name, request) if entry.kind == "learned" else []
+        found = self._candidate(name, task, tuple(folders) or (None,))
+        return replace(found, options=entry.needed_options(found.options))
 
     def _candidate(
         self, name: str, task: str, folders: tuple[Path | None, ...], entry: Path | None = None

@@ -110,6 +110,7 @@ def describe_task(task: Task) -> str:
     slope += ", varying" if task.slope_varies else ""
     facts = [
         ("slope", slope),
+        ("friction limit", f"{body.friction_limit:g}"),
         ("horizon", f"{task.horizon:g} units of time (truncation)"),
         ("ends", "; ".join(filter(None, ("a fall, a termination without reward", task.ends)))),
         ("reward per unit of time", task.reward_text),

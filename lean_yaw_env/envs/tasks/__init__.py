@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 from lean_yaw_env.envs.tasks.energy import ENERGY
-from lean_yaw_env.envs.tasks.headings import HEADING, LEVEL, SPEED_HEADING, UNKNOWN_BODY, UTURN
+from lean_yaw_env.envs.tasks.headings import (
+    HEADING,
+    LEVEL,
+    LEVEL_UPHILL,
+    SPEED_HEADING,
+    UNKNOWN_BODY,
+    UTURN,
+)
 from lean_yaw_env.envs.tasks.hills import HILLS
 from lean_yaw_env.envs.tasks.race import RACE
 from lean_yaw_env.envs.tasks.slalom import SLALOM
@@ -14,8 +21,8 @@ from lean_yaw_env.registration import name_of_task, register_id
 from lean_yaw_env.validation import require_instance, suggestion
 
 _ALL = (
-    HEADING, WALK, SPEED_HEADING, WAYPOINT, SLALOM, METASTABLE, UTURN, LEVEL, ENERGY, UNKNOWN_BODY,
-    RACE, HILLS, WAYPOINT_GOAL,
+    HEADING, WALK, SPEED_HEADING, WAYPOINT, SLALOM, METASTABLE, UTURN, LEVEL, LEVEL_UPHILL, ENERGY,
+    UNKNOWN_BODY, RACE, HILLS, WAYPOINT_GOAL,
 )  # fmt: skip
 TASKS = {task.name: task for task in _ALL}
 """Those of this package and of others (``register_task``)."""

@@ -55,13 +55,12 @@ def observe_nothing(walker: Any, task: Any) -> Any:
 
 
 FIRST = "0: the first."
-TO_THE_HORIZON = "the step across the horizon is paid, and counted in metrics, to the horizon alone"
+FRICTION_LIMIT = 0.6
+"""Friction limit of the tasks of this package: the least that tables give for rubber on dry concrete, 0.6 to 0.85."""
+SINCE_VERSION_1 = f"the friction limit is {FRICTION_LIMIT}; the step across the horizon is paid, and counted in metrics, to the horizon alone"
 """What version 1 changed in every task of the package."""
-
 NEW = ("1: the first.",)
 """The history of a task that came with version 1."""
-FRICTION_LIMIT = 0.6
-"""A rubber sole on a dry hard floor: tables have 0.6 to 0.8."""
 
 TASK_RANGES = (
     Range("horizon", 0.0, math.inf, "(]"),

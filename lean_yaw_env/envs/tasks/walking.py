@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from lean_yaw_env.envs.dynamics import ANKLE_PUSH, PITCH_PUSH
-from lean_yaw_env.envs.tasks.task import FIRST, FRICTION_LIMIT, TO_THE_HORIZON, Metric, Task
+from lean_yaw_env.envs.tasks.task import FIRST, FRICTION_LIMIT, SINCE_VERSION_1, Metric, Task
 from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.parameters import WalkerParameters
 
@@ -30,7 +30,8 @@ WALK = Task(
     },
     summary="Keep walking; nothing is commanded. A smoke test, which ranks nobody.",
     reward_text=f"{WALKING_RATE} - {EFFORT_RATE} effort",
-    history=(FIRST, f"1: {TO_THE_HORIZON}."),
+    history=(FIRST, f"1: {SINCE_VERSION_1}."),
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
     is_ranked=False,
 )
 
