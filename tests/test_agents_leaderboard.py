@@ -424,10 +424,10 @@ def test_the_leaderboard_holds_every_agent_and_the_command_that_made_it(tmp_path
         assert len(list(csv.DictReader(file))) == len(rows)
     images = {path.name for path in (tmp_path / "docs" / "images").iterdir()}
     assert images == {
-        "leaderboard.png", "push_levels.png", "footprints_walk.png", "footprints_metastable.png", "capture_walk.png",
-        "capture_metastable.png"
+        "leaderboard.png", "push_levels.png", "footprints_walk.png", "footprints_metastable.png", "capture_walk_friction_0.6.png",
+        "capture_metastable_friction_0.6.png"
     }  # fmt: skip
-    assert "(images/capture_metastable.png)" in page
+    assert "(images/capture_metastable_friction_0.6.png)" in page
 
 
 def test_a_page_says_plainly_what_does_not_hold():

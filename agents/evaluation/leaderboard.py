@@ -35,6 +35,7 @@ from .plan import (
     Evaluation,
     make_candidate,
 )
+from .robustness import collapses
 from .row_tables import (
     IMAGES,
     bracketed,
@@ -152,7 +153,8 @@ def make_leaderboard(
             )
     save_captures(captures, images)
     saved = {(each.task, each.agent): each.share() for each in captures}
-    write_text(out / "leaderboard.md", leaderboard_page(rows, claims, levels, saved, origin))
+    page = leaderboard_page(rows, claims, levels, saved, origin, out / "robustness.csv")
+    write_text(out / "leaderboard.md", page)
     return rows, own
 
 
@@ -217,9 +219,14 @@ def _levels_to_csv(levels: Levels) -> str:
 
 
 def leaderboard_page(
-    rows: Sequence[Row], claims: Sequence[Claim], levels: Levels, saved: Saved, made: str
+    rows: Sequence[Row],
+    claims: Sequence[Claim],
+    levels: Levels,
+    saved: Saved,
+    made: str,
+    robustness: Path | None = None,
 ) -> str:
-    """The whole page; ``made`` says how it was made."""
+    """The whole page; ``made`` says how it was made. ``robustness`` is the file that ``python -m agents robustness`` wrote, if it is there."""
     reading = _READING.format(confidence=CONFIDENCE, resamples=RESAMPLES, claim_resamples=CLAIM_RESAMPLES, chosen_steps=MOST_STEPS, horizon=LONG_HORIZON)  # fmt: skip
     parts = [
         "# Leaderboard",
@@ -251,6 +258,14 @@ def leaderboard_page(
             "log10 of the time per fall, with the same agents.",
             _levels_table(levels),
             "![Time per fall against push level](images/push_levels.png)",
+        ]
+    if robustness is not None and robustness.exists():
+        parts += [
+            "## Robustness",
+            "Each agent under one changed option, without any adaptation ([all numbers](robustness.md)). These are the collapses: more than half of the main "
+            "metric is lost, or 90 % of the time per fall.",
+            markdown_table(("task", "agent", "as it is", "collapses under"), collapses(robustness)),
+            "![Main metric under each changed option](images/robustness.png)",
         ]
     return "\n\n".join(parts) + "\n"
 
