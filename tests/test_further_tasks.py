@@ -14,7 +14,7 @@ from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.reset import HELD_OUT_REACH
 from lean_yaw_env.envs.state import BODY_NAMES
-from lean_yaw_env.envs.tasks import energy, hills, race, task_named
+from lean_yaw_env.envs.tasks import energy, hills, task_named
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.envs.walker_env import WalkerEnv
 
@@ -132,9 +132,12 @@ def test_gates_are_counted_once_and_a_missed_one_costs() -> None:
         beyond = x >= before[1]
         crossed += beyond
         assert np.array_equal(info["gates_passed"] + info["gates_missed"], count + beyond)
-        is_missed = beyond & (np.abs(z - before[2]) > race.HALF_WIDTH)
+        miss = np.maximum(np.abs(z - before[2]) - 0.5, 0.0)
+        is_missed = beyond & (miss > 0.0)
         assert np.array_equal(info["gates_missed"], missed + is_missed)
-        assert rewards == pytest.approx(x - before[0] - race.MISS_PRICE * is_missed, abs=1e-12)
+        assert rewards == pytest.approx(
+            x - before[0] - 8.0 * beyond * np.minimum(miss / 2.0, 1.0), abs=1e-12
+        )
         assert np.all(simulation.tasks["goal_x"] > x)
     assert crossed.min() >= 3  # of gates at most 12 apart, on 200 steps of 0.3
 
