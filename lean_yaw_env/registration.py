@@ -11,7 +11,8 @@ NAMESPACE = "LeanYaw"
 
 SUITE_VERSION = 1
 _TASKS = (
-    "Heading", "Walk", "SpeedHeading", "Waypoint", "Slalom", "Push", "UTurn", "Level", "LevelUphill",
+    "Heading", "Walk", "SpeedHeading", "Waypoint", "Slalom", "Metastable", "UTurn", "Level",
+    "LevelUphill", "Energy", "UnknownBody", "Race", "Hills",
 )  # fmt: skip
 TASK_VERSIONS = dict.fromkeys(_TASKS, SUITE_VERSION)
 """Every task's name and version; ``envs.tasks`` defines the tasks."""

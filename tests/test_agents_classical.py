@@ -38,7 +38,7 @@ from lean_yaw_env.parameters import MIRROR
 WEIGHTS = LqrWeights()
 RAW = EnvOptions(mirror=False)
 MIDDLE = int(np.argmin(np.abs(np.array(ANGLES) - 0.3)))
-TASKS = ("Heading", "SpeedHeading", "Push", "Slalom", "Waypoint", "Level", "UTurn")
+TASKS = ("Heading", "SpeedHeading", "Metastable", "Slalom", "Waypoint", "Level", "UTurn")
 ROUGH = EnvOptions(friction_limit=math.inf)
 AGENTS_BY_TASK = {task: guided(task, EnvOptions()) for task in TASKS}
 
@@ -248,7 +248,6 @@ def test_the_gait_itself_is_answered_by_its_own_command():
         ("SpeedHeading", "settled_fraction", 0.6, EnvOptions()),  # (0.71)
         ("Waypoint", "goals", 3.5, EnvOptions()),  # (4.8)
         # their settings are tuned for a floor that lets no foot slip
-        ("Push", "survived_200_steps", 0.7, ROUGH),  # (0.91)
         ("Level", "settled_fraction", 0.7, ROUGH),  # (0.81)
         ("UTurn", "settled_fraction", 0.5, replace(ROUGH, push_level=0.0)),  # (0.6)
     ],

@@ -532,7 +532,7 @@ def test_pictures_of_a_step_begin_and_end_with_those_of_its_heel_strikes() -> No
 
 
 def test_a_fall_is_drawn_where_the_walker_fell() -> None:
-    env = WalkerEnv("Push", render_mode="rgb_array", push_level=5.0)
+    env = WalkerEnv("Metastable", render_mode="rgb_array", push_level=5.0)
     env.reset(seed=0)
     terminated = False
     while not terminated:
@@ -652,7 +652,7 @@ def test_keys_cover_what_can_be_held_and_steer_to_their_side() -> None:
     "name", ["TimeAwareObservation", "NumpyToTorch", "RecordEpisodeStatistics"]
 )
 def test_gymnasium_s_wrappers_take_it(name: str) -> None:
-    env = getattr(gym.wrappers, name)(gym.make("LeanYaw/Push-v1", max_episode_steps=5))
+    env = getattr(gym.wrappers, name)(gym.make("LeanYaw/Metastable-v1", max_episode_steps=5))
     env.reset(seed=1)
     zero = env.unwrapped.action_space.sample() * 0
     if name == "NumpyToTorch":

@@ -7,10 +7,12 @@ from math import pi
 from typing import Any
 
 from lean_yaw_env.envs.formulas import closeness, counted_time, mean_heading, positive, wrapped
+from lean_yaw_env.envs.reset import BODY_DEVIATIONS
 from lean_yaw_env.envs.state import Field
 from lean_yaw_env.envs.tasks.task import (
     FIRST,
-    FLOOR,
+    FRICTION_LIMIT,
+    NEW,
     SINCE_VERSION_1,
     Command,
     Feature,
@@ -139,7 +141,7 @@ HEADING = Task(
     history=(FIRST, f"1: commands last a time, not a number of steps; {SINCE_VERSION_1}."),
     commands={"command": Command(("command",), -pi, pi, "heading, rad")},
     heading_field="command",
-    parameters=WalkerParameters(friction_limit=FLOOR),
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
 )
 
 UTURN = replace(
@@ -273,7 +275,7 @@ LEVEL = replace(
     f"start near the gait of offsets of {PUMPING} away from the stance foot.",
     reward_text=f"{WALKING_RATE} + {LEVEL_TRACKING_RATE} / (1 + (heading error / {TRACKING_WIDTH})^2) + {PROGRESS} speed - {WORK_PRICE:g} "
     "(power put into moving the masses)",
-    parameters=WalkerParameters(slope=0.0, friction_limit=FLOOR),
+    parameters=WalkerParameters(slope=0.0, friction_limit=FRICTION_LIMIT),
     max_offset_change=0.1,
     pumping=PUMPING,
 )
@@ -285,6 +287,18 @@ LEVEL_UPHILL = replace(
     name="LevelUphill",
     summary=f"Level on a floor that rises: walk up a slope of {-UPHILL} rad, powered by nothing but moving the masses from side to side, and "
     f"steer as in Level, either side of straight up the slope.",
-    history=("1: the first.",),
-    parameters=WalkerParameters(slope=UPHILL, friction_limit=FLOOR),
+    history=NEW,
+    parameters=WalkerParameters(slope=UPHILL, friction_limit=FRICTION_LIMIT),
+)
+
+UNKNOWN_BODY = replace(
+    HEADING,
+    name="UnknownBody",
+    summary="Heading with a body that you do not know: drawn anew for each episode from a box twice as wide as that of other tasks, and with both "
+    "rates hidden. It must be learned from how the walker moves, in memory of past observations; an oracle sees it (`show_body=True`).",
+    history=NEW,
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
+    hidden_rates=True,
+    random_body="training",
+    body_reach=tuple(2.0 * reach for reach in BODY_DEVIATIONS),
 )

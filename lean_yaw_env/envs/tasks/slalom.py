@@ -9,7 +9,14 @@ import numpy as np
 
 from lean_yaw_env.envs.formulas import counted_time, mean_heading, place, wrapped
 from lean_yaw_env.envs.state import Field
-from lean_yaw_env.envs.tasks.task import FIRST, FLOOR, SINCE_VERSION_1, Feature, Metric, Task
+from lean_yaw_env.envs.tasks.task import (
+    FIRST,
+    FRICTION_LIMIT,
+    SINCE_VERSION_1,
+    Feature,
+    Metric,
+    Task,
+)
 from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.kernel.random import uniform
 from lean_yaw_env.parameters import Vector, WalkerParameters
@@ -176,7 +183,7 @@ SLALOM = Task(
     f"slopes to {GREATEST_SLOPE} and curvature to {GREATEST_CURVATURE}, under pushes.",
     reward_text=f"{WALKING_RATE} + {TRACKING_RATE} / (1 + (cross-track error / {TRACKING_WIDTH})^2) - {EFFORT_RATE} effort",
     history=(FIRST, f"1: the push level is 0.4 in place of 0.2; {SINCE_VERSION_1}."),
-    parameters=WalkerParameters(friction_limit=FLOOR),
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
     ends=f"a cross-track error beyond {LARGEST_ERROR:g}, as a termination without reward",
     reference_path=reference_path,
     push_level=0.4,

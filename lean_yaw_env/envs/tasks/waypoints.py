@@ -12,7 +12,7 @@ from lean_yaw_env.envs.formulas import direction, ends_in_time, mean_heading, pl
 from lean_yaw_env.envs.state import Field
 from lean_yaw_env.envs.tasks.task import (
     FIRST,
-    FLOOR,
+    FRICTION_LIMIT,
     SINCE_VERSION_1,
     Command,
     Feature,
@@ -157,7 +157,7 @@ WAYPOINT = Task(
     },
     goal_fields=("goal_x", "goal_z"),
     goal_radius=RADIUS,
-    parameters=WalkerParameters(slope_turns=True, friction_limit=FLOOR),
+    parameters=WalkerParameters(slope_turns=True, friction_limit=FRICTION_LIMIT),
     horizon=300.0,
     headline="goals",
 )
