@@ -136,14 +136,14 @@ RANGES: dict[tuple[str, str], dict[str, Range]] = {
     ("lqr", "UTurn"): _LOOP | _ANGLE | _TURN | _PUMPING | _UPHILL,
     ("lqr", "Level"): _LOOP | _ANGLE | _TURN | _PUMPING,
     ("lqr", "Walk"): _LOOP | _ANGLE,
-    ("lqr", "Push"): _LOOP | _ANGLE | _PUMPING,
+    ("lqr", "Metastable"): _LOOP | _ANGLE | _PUMPING,
     ("lqr", "Slalom"): _GUIDED | {"ahead": (0.0, 6.0, False), "approach": (1.0, 30.0, True)},
     ("lqr", "Waypoint"): _GUIDED | {"radius": (1.0, 8.0, True), "persistence": (0.0, 2.0, False)},
 }
 """Of the numbers that are tuned, by agent and task and by their paths in the settings."""
 
 _CONDITIONS = {
-    ("lqr", "Push"): tuple(EnvOptions(push_level=x, horizon=150.0) for x in (0.5, 0.7, 1.0)),
+    ("lqr", "Metastable"): tuple(EnvOptions(push_level=x, horizon=150.0) for x in (0.5, 0.7, 1.0)),
     ("lqr", "Slalom"): (EnvOptions(horizon=100.0),),
 }
 """Episodes that are shorter than the task's, but long enough to tell good from bad, and several push levels at once."""
