@@ -5,14 +5,15 @@ from __future__ import annotations
 import csv
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from agents import FixedController, RandomController
+from agents import FixedController, RandomController, references
 from agents.command_line import app
-from agents.evaluation import plan
+from agents.evaluation import leaderboard, plan
 from agents.evaluation.comparison import (
     Claim,
     best_feedback,
@@ -441,6 +442,32 @@ def test_a_page_says_plainly_what_does_not_hold():
     assert "no: sac is worse than lqr" in page
     assert "**ppo** is better than the best feedback controller on no task" in page
     assert "The correction is for 2 claims" in page
+
+
+def test_a_page_says_whether_the_best_agent_leaves_room_to_win(monkeypatch):
+    known = {"metric": RETURN, "fixed": 10.0, "found_by": "a search"}
+    found = {
+        task: SimpleNamespace(**known, value=value) for task, value in (("Heading", 30.0), ("Level", 21.0))
+    }  # fmt: skip
+    monkeypatch.setattr(references, "references", lambda: found)
+    monkeypatch.setattr(leaderboard, "references", lambda: found)
+    results = {
+        task: named(walked(task, "fixed", np.full((1, 9), 10.0)), walked(task, "lqr", np.full((1, 9), 20.0)))
+        for task in ("Heading", "Level", "Slalom", "Walk")
+    }  # fmt: skip
+    rows, claims = compared_rows(results, {})
+    rows = [leaderboard._normalised(row) for row in rows]
+    assert {row.normalised for row in rows if (row.task, row.metric) == ("Heading", RETURN)} == {0.0, 0.5}  # fmt: skip
+    page = leaderboard_page(rows, claims, {}, {}, "Made by a test.")
+    assert "30.0 (a search) | lqr | 20.0 [20.0, 20.0] | 0.50 | yes |" in page
+    assert "| 0.91 | **no: nearly solved** |" in page
+    assert "not known: no reference" in page
+    assert "**A smoke test: it ranks no agent.**" in page and "| Walk | return" not in page
+
+
+def test_a_task_that_ranks_nobody_makes_no_claims():
+    of_walk = named(*(walked("Walk", name, returns(k)) for k, name in enumerate(("random", "fixed", "lqr"))))  # fmt: skip
+    assert claims_of({"Walk": of_walk}, {"Walk": "lqr"}) == []
 
 
 def test_the_rival_is_chosen_on_validation_and_only_the_leaderboard_reads_the_test(
