@@ -22,6 +22,7 @@ from lean_yaw_env.validation import (
 
 from .agent import Agent
 from .controllers.guidance import guided
+from .controllers.linear import LinearLaw
 from .controllers.mpc import MpcController
 from .controllers.simple import FixedController, HeadingFeedback, RandomController
 from .observations import ObservationLayout
@@ -94,6 +95,10 @@ def _lqr(request: AgentRequest) -> Agent:
     return guided("Waypoint" if task == GOAL_TASK else task, request.options)
 
 
+def _linear(request: AgentRequest) -> Agent:
+    return LinearLaw(task_of(request.env_id), request.options)
+
+
 def _mpc(request: AgentRequest) -> Agent:
     task, base = task_of(request.env_id), make_base(request)[1]
     return MpcController(task, request.options, base, seed=request.seed)
@@ -132,6 +137,7 @@ AGENTS: dict[str, AgentEntry] = {
     "fixed": AgentEntry("baseline", lambda asked: FixedController(_layout(asked))),
     "feedback": AgentEntry("feedback", _feedback, _STEERED),
     "lqr": AgentEntry("feedback", _lqr),
+    "linear": AgentEntry("feedback", _linear, tuple(all_settings().get("linear", {}))),
     "mpc": AgentEntry("planner", _mpc, tuple(TASK_VERSIONS)),
     "ppo": AgentEntry("learned", _trained("ppo")),
     "sac": AgentEntry("learned", _trained("sac")),
