@@ -1,4 +1,4 @@
-"""Pictures of what the commands find: a gait, a map of gaits, a basin of attraction, a vehicle's eigenvalues."""
+"""Figures of what the analysis finds: a gait, a map of gaits, a basin of attraction, a vehicle's eigenvalues. They need matplotlib."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ from lean_yaw_env.rendering.palette import (
     mixed,
     unit_colour,
 )
+
+__all__ = ["basin_figure", "eigenvalue_figure", "gait_figure", "map_figure"]
 
 if TYPE_CHECKING:
     import xarray
@@ -90,7 +92,7 @@ def _draw_multipliers(plane: Axes, cycle: LimitCycle) -> None:
 
 
 def map_figure(data: xarray.Dataset) -> Figure:
-    """A stability map: over one parameter |λ| and the speed, over two a plane, over three planes at some values of the first."""
+    """A stability map: over one parameter the magnitudes of the multipliers and the speed, over two a plane, over three planes at some values of the first."""
     names = [str(name) for name in data["spectral_radius"].dims]
     if len(names) == 1:
         return _line_map(data, names[0])
