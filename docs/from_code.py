@@ -17,6 +17,12 @@ PACKAGES = (
 )  # fmt: skip
 """All packages and modules of the reference. A name of several is described with the first."""
 
+PROGRAMS = {
+    "walker": ("lean_yaw_env.cli.app", "lean-yaw"),
+    "agents": ("agents.command_line", "python -m agents"),
+}
+"""Command lines: the module of each one's ``app``, and how it is called."""
+
 
 def filled(page: str) -> str:
     """A page with its marks replaced."""
@@ -99,16 +105,14 @@ def without_markdown(lines: list[str]) -> list[str]:
     return result
 
 
-def commands(place: str) -> str:
-    """The help of a command line and of all its commands; ``place`` is module:app:name."""
+def commands(program: str) -> str:
+    """The help of a command line and of all its commands."""
     import typer
     from typer.cli import get_docs_for_click
 
-    module, app, name = place.split(":")
-    command = typer.main.get_command(getattr(importlib.import_module(module), app))
-    text = get_docs_for_click(
-        obj=command, ctx=typer.Context(command), name=name.replace("_", " "), indent=1
-    )
+    module, name = PROGRAMS[program]
+    command = typer.main.get_command(importlib.import_module(module).app)
+    text = get_docs_for_click(obj=command, ctx=typer.Context(command), name=name, indent=1)
     return text.split("\n", 1)[1].replace("```console\n$ ", "```\n")
 
 

@@ -17,11 +17,12 @@ from lean_yaw_env.rendering.palette import (
     GREEN,
     LIGHT_GREY,
     SERIES_COLOURS,
+    STRONG_GRID,
     mixed,
     unit_colour,
 )
 
-__all__ = ["basin_figure", "eigenvalue_figure", "gait_figure", "map_figure"]
+__all__ = ["basin_figure", "eigenvalue_figure", "gait_figure", "map_figure", "use_style"]
 
 if TYPE_CHECKING:
     import xarray
@@ -40,6 +41,24 @@ _MOST_PANELS = 6
 
 def _name(name: str) -> str:
     return name.replace("_", " ")
+
+
+def use_style() -> None:
+    """Give pyplot's figures of this program the colours and lines of the package's own."""
+    from cycler import cycler
+    from matplotlib import rcParams
+
+    rcParams.update(
+        {
+            "axes.prop_cycle": cycler(color=_COLOURS),
+            "axes.spines.right": False,
+            "axes.spines.top": False,
+            "figure.constrained_layout.use": True,
+            "figure.figsize": (8.0, 3.6),
+            "grid.color": unit_colour(STRONG_GRID),
+            "legend.frameon": False,
+        }
+    )
 
 
 def gait_figure(cycle: LimitCycle) -> Figure:
