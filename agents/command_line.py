@@ -56,7 +56,7 @@ def main() -> None:
 
 @_command("train")
 def train(
-    task: Annotated[str, Option(help="The task's name, as in LeanYaw/<task>-v0.")] = "Heading",
+    task: Annotated[str, Option(help="The task's name, as in LeanYaw/<task>-v1.")] = "Heading",
     seed: Annotated[int | None, Option(help="Random seed; 0 by default.")] = None,
     seeds: Annotated[str | None, Option(help="Several seeds instead of one, a run for each: 0-4, or 5 for the same, or 0,3,7.")] = None,
     jobs: Annotated[int, Option(min=1, help="Number of processes for several seeds.")] = 1,

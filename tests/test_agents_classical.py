@@ -319,7 +319,7 @@ def test_on_the_level_the_gait_that_pumps_is_answered_by_its_own_command():
 
 
 def test_a_walker_without_a_gait_gets_no_regulator(monkeypatch):
-    request = AgentRequest("LeanYaw/Level-v0", EnvOptions())
+    request = AgentRequest("LeanYaw/Level-v1", EnvOptions())
     monkeypatch.setattr("agents.settings.all_settings", dict)
     # nothing tuned, so nothing that pumps: on the level there is no gait
     with pytest.raises(NoGaitError):
@@ -328,7 +328,7 @@ def test_a_walker_without_a_gait_gets_no_regulator(monkeypatch):
 
 def test_the_registry_makes_them_by_one_name():
     for task, agent in AGENTS_BY_TASK.items():
-        made = make_agent("lqr", AgentRequest(f"LeanYaw/{task}-v0", EnvOptions()))
+        made = make_agent("lqr", AgentRequest(f"LeanYaw/{task}-v1", EnvOptions()))
         assert type(made) is type(agent)
 
 

@@ -211,7 +211,7 @@ def test_every_agent_has_a_kind_and_is_made_for_its_tasks_alone():
 
 
 def test_learned_agents_are_there_where_a_training_is_found(tmp_path: Path):
-    request = AgentRequest("LeanYaw/Walk-v0", EnvOptions(), path=tmp_path)
+    request = AgentRequest("LeanYaw/Walk-v1", EnvOptions(), path=tmp_path)
     assert "ppo" in names_for(request)
     quick = make_all(replace(request, path=None, runs=tmp_path), ("baseline",))
     assert list(quick) == ["random", "fixed"]

@@ -156,8 +156,8 @@ def test_every_task_has_settings_and_a_planner_that_walks(task):
 
 def test_the_planner_of_that_name_plans_around_the_regulator():
     options = EnvOptions(horizon=3.0)
-    planner = make_agent("mpc", AgentRequest("LeanYaw/Push-v0", options))
-    regulator = make_agent("lqr", AgentRequest("LeanYaw/Push-v0", options))
+    planner = make_agent("mpc", AgentRequest("LeanYaw/Push-v1", options))
+    regulator = make_agent("lqr", AgentRequest("LeanYaw/Push-v1", options))
     env = started("Push", steps=0, horizon=3.0)
     assert isinstance(planner, MpcController)
     named = MpcController("Push", options, base=regulator)

@@ -134,10 +134,10 @@ def test_a_series_goes_on_with_what_is_unfinished_and_gathers_its_seeds(tmp_path
     with (folder / "seeds.csv").open() as file:
         assert next(csv.reader(file)) == ["metric", "median", "lowest", "highest", "seed0", "seed3"]
     assert (folder / "learning_curves.png").stat().st_size > 0
-    assert newest_policy("LeanYaw/Walk-v0", tmp_path) == runs[3]
+    assert newest_policy("LeanYaw/Walk-v1", tmp_path) == runs[3]
     monkeypatch.setattr(policy_files, "SHIPPED", tmp_path / "trained")
     ship(folder)
-    assert policy_files.shipped_seeds("LeanYaw/Walk-v0") == [0, 3]
+    assert policy_files.shipped_seeds("LeanYaw/Walk-v1") == [0, 3]
 
 
 def test_the_newest_of_runs_and_series_is_gone_on_with(tmp_path):

@@ -32,7 +32,7 @@ from agents.shipping import ship
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.files import BusyError, locked
 
-ID = "LeanYaw/Heading-v0"
+ID = "LeanYaw/Heading-v1"
 TINY = PPOSettings(
     steps=1280, walkers=8, steps_per_update=32, batch_size=128, epochs=2, hidden=(8, 8)
 )
@@ -227,7 +227,7 @@ def test_finished_runs_are_shipped_and_loaded_by_id_and_others_are_refused(tmp_p
         ship(folder)
     result = run(folder, progress=False)
     (shipped,) = ship(folder)
-    assert shipped == tmp_path / "trained" / "Heading-v0" / "ppo" / "seed3"
+    assert shipped == tmp_path / "trained" / "Heading-v1" / "ppo" / "seed3"
     names = ["evaluation.json", "policy.json", "policy.safetensors"]
     assert sorted(path.name for path in shipped.iterdir()) == names
     assert load(ID, seed=3).card == result.policy.card

@@ -96,7 +96,7 @@ def test_settings_of_the_package_make_agents_and_lie_where_they_are_tuned():
             if AGENTS[agent].kind == "learned":
                 assert set(values) <= {*values_of(settings_for(agent, task))}
                 continue
-            made = make_agent(agent, AgentRequest(f"LeanYaw/{task}-v0", EnvOptions()))
+            made = make_agent(agent, AgentRequest(f"LeanYaw/{task}-v1", EnvOptions()))
             if agent != "mpc":  # which needs the environment
                 width = len(ObservationLayout.of(task, EnvOptions()).names)
                 assert np.abs(made.predict(np.zeros((2, width)))[0]).max() <= 1.0

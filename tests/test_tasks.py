@@ -30,6 +30,7 @@ from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.registration import ENV_IDS, TASK_VERSIONS
 
 TASKS = tuple(TASK_VERSIONS)
+COMMANDED = [name for name in TASKS if "command_left" in task_named(name).initial.dtype.names]
 BODY = ("hip_width", "foot_radius", "ankle_tilt", "slope")
 HARD = {
     "none": {},
@@ -136,17 +137,51 @@ def test_a_step_that_takes_no_time_leaves_numbers_numbers(task: str) -> None:
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_the_horizon_is_simulated_time_and_truncates(task: str) -> None:
-    env = WalkerEnv(task, horizon=3.0, push_level=0.0, start_disturbance=0.0)
-    env.reset(seed=0)
-    time = 0.0
+def test_rewards_and_sums_count_to_the_horizon_and_no_further(task: str) -> None:
+    env, longer = (
+        WalkerEnv(task, horizon=horizon, push_level=0.0, start_disturbance=0.0)
+        for horizon in (3.0, 300.0)
+    )
+    for each in (env, longer):
+        each.reset(seed=0)
     truncated = terminated = False
     while not (truncated or terminated):
-        before = time
-        _, _, terminated, truncated, info = env.step(ZERO)
-        time = info["time"]
-    assert truncated
-    assert before < 3.0 <= time
+        before = env.simulation.walkers[0].copy()
+        _, reward, terminated, truncated, info = env.step(ZERO)
+        _, whole, _, _, onward = longer.step(ZERO)
+    assert truncated and not terminated
+    assert before["time"] < 3.0 < onward["time"]
+    assert info["time"] == 3.0
+    assert info["duration"] == onward["duration"]
+    share = (3.0 - before["time"]) / info["duration"]
+    assert reward == pytest.approx(share * whole, abs=1e-15)
+    advance = onward["distance"] - before["distance"]
+    assert info["distance"] == pytest.approx(before["distance"] + share * advance, abs=1e-12)
+
+
+@pytest.mark.parametrize("task", COMMANDED)
+def test_commands_come_at_times_that_do_not_depend_on_the_steps(task: str) -> None:
+    schedules = []
+    for angle in (-0.3, 0.3):  # short and long steps
+        env = WalkerEnv(task, push_level=0.0, start_disturbance=0.0)
+        env.reset(seed=0)
+        record, schedule, due = env.simulation.tasks, [], 0.0
+        action = np.array([angle, 0.6 if env.task.pumping else 0.0], dtype=np.float32)
+        truncated = terminated = False
+        time = before = 0.0
+        while not (truncated or terminated):
+            if record["since_command"][0] == 0.0:
+                assert before <= due <= time
+                due = time + float(record["command_left"][0])
+                schedule.append((due, float(record["command"][0])))
+            before = time
+            *_, terminated, truncated, info = env.step(action)
+            time = info["time"]
+        assert truncated
+        schedules.append(schedule)
+    # sums of about 200 steps' durations
+    np.testing.assert_allclose(*schedules, rtol=0.0, atol=1e-11)
+    assert len(schedules[0]) > 3
 
 
 @pytest.mark.parametrize("task", TASKS)

@@ -4,7 +4,8 @@ Complex numbers carry them: an imaginary part of 1e-30 on one input gives imagin
 without a difference of nearby numbers. The walking step's own come from ``kernel.jacobian``.
 
 Inputs are what a step's result depends on: the walker's ``FOLLOWED`` fields before the step, the task's fields of which ``is_followed`` is
-set, then what is commanded (``COMMANDED``). Outputs are the followed fields after the step, the observation, the reward, the duration.
+set, then what is commanded (``COMMANDED``). Outputs are the followed fields after the step, the observation, the reward, the duration. Of
+the step across the horizon, reward and duration count to the horizon, whose distance in time is taken as given.
 
 ``differentiate`` is a template, as ``outputs.write_outputs`` is.
 """
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from lean_yaw_env.envs.dynamics import move
+from lean_yaw_env.envs.formulas import counted_time
 from lean_yaw_env.envs.observation import (
     ANKLE_RATE,
     COMMON_CENTRES,
@@ -181,18 +183,19 @@ def differentiate(befores, tasks_before, walkers, tasks, settings, steps, jacobi
             walker.commanded_offset = walkers[i].commanded_offset
             walker.effort = walkers[i].effort
             SEED(walker, task, k)
-            move(walker, step_outcome(befores[i], walkers[i], steps[i], KERNEL_INPUTS[k]))
+            outcome = step_outcome(befores[i], walkers[i], steps[i], KERNEL_INPUTS[k])
+            move(walker, outcome, common.horizon)
             walker.stance_pitch_rate += walkers[i].pitch_push
             walker.ankle_rate += walkers[i].ankle_push
             column = jacobians[i, :, k]
-            reward = TASK_REWARD(walker, task)
+            reward = walker.share * TASK_REWARD(walker, task)
             # what the task asks next is drawn, and no derivative leads through a draw
             COPY_TASK(task, tasks[i])
             TASK_REFRESH(walker, task)
             READ(column, walker, task)
             row = read_observation(column, walker, task, common)
             column[row] = reward.imag / TINY
-            column[row + 1] = walker.duration.imag / TINY
+            column[row + 1] = counted_time(walker).imag / TINY
 
 
 class LinearisedSteps:

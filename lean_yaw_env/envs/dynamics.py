@@ -53,10 +53,14 @@ def outcome_of(row: Any) -> Any:
 
 
 @formula
-def move(walker: Any, outcome: Any) -> None:
-    """Take a step's outcome into the record. A step that the solver gave up leaves the walker where it stood."""
+def move(walker: Any, outcome: Any, horizon: float) -> None:
+    """Take a step's outcome into the record. A step that the solver gave up leaves the walker where it stood.
+
+    Time, distance and work count to the horizon, a share of the step across it.
+    """
     walker.fall = int(outcome.status) - _STEPPED
     walker.steps += 1
+    walker.share = 1.0
     if outcome.status == FAILED:
         walker.duration = 0.0
         walker.advance = 0.0
@@ -78,14 +82,19 @@ def move(walker: Any, outcome: Any) -> None:
     walker.shift_work = outcome.shift_work
     walker.impact_loss = outcome.impact_loss
     walker.ankle_loss = outcome.ankle_loss
-    walker.time += outcome.duration
-    walker.work += positive(outcome.shift_work)
+    left = horizon - walker.time
+    if outcome.duration.real > left.real:
+        walker.share = left / outcome.duration
+        walker.time = horizon
+    else:
+        walker.time += outcome.duration
+    walker.work += walker.share * positive(outcome.shift_work)
     x = outcome.displacement_x
     z = outcome.displacement_z
     walker.place_x += x
     walker.place_z += z
     walker.advance = advance(x, z, mean_heading(walker))
-    walker.distance += walker.advance
+    walker.distance += walker.share * walker.advance
     # a heel strike at the very start of a step takes no time and tells nothing of speed
     if walks and outcome.duration.real > 0.0:
         walker.speed = walker.advance / outcome.duration
@@ -123,7 +132,7 @@ def walk_one(walkers, bodies, settings, actions):
         walker.heading, walker.stance_pitch, walker.ankle_angle,
         walker.stance_pitch_rate, walker.ankle_rate, walker.side,
     )  # fmt: skip
-    move(walker, outcome)
+    move(walker, outcome, common.horizon)
     push(walker, common)
     return True
 
@@ -172,5 +181,5 @@ def walk_many(walkers, bodies, settings, actions, skip, first, last):
         step_batch(own_bodies, commands, states, sides, outcomes, 0, n)
         for k in range(n):
             walker = walkers[owners[k]]
-            move(walker, outcome_of(outcomes[k]))
+            move(walker, outcome_of(outcomes[k]), common.horizon)
             push(walker, common)

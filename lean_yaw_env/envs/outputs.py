@@ -50,10 +50,13 @@ CENTRES, SCALES, ODD = COMMON_CENTRES, COMMON_SCALES, COMMON_ODD
 
 
 def reward_and_ends(walker, task, settings):
-    """A step's reward, and whether it ends the episode: terminated, truncated. The reward of a fall is zero."""
+    """A step's reward, and whether it ends the episode: terminated, truncated.
+
+    The reward of a fall is zero, that of the step across the horizon the share that lies before it.
+    """
     if walker.fall != 0:
         return 0.0, True, False
-    reward = TASK_REWARD(walker, task)
+    reward = walker.share * TASK_REWARD(walker, task)
     ends = TASK_UPDATE(walker, task)
     is_late = walker.time >= settings.horizon or walker.steps >= settings.max_episode_steps
     return reward, ends, is_late and not ends

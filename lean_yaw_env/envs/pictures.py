@@ -98,7 +98,9 @@ class Footage:
         """When in the last step a picture is due, ``FRAMES_PER_SECOND`` in real time, as shares of the step."""
         if not self._motions:
             return [1.0]
-        end = float(self._simulation.walkers["time"][self._row])
+        walker, _ = self._simulation.records(self._row)
+        # the step across the horizon is shown to its end
+        end = float(walker.time + (1.0 - walker.share) * walker.duration)
         rate, duration = FRAMES_PER_SECOND * SECONDS_PER_TIME_UNIT, self.motion.duration
         first, last = math.floor((end - duration) * rate) + 1, math.floor(end * rate)
         return [1.0 - (end - k / rate) / duration for k in range(first, last + 1)]

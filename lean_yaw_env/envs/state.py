@@ -53,20 +53,23 @@ WALKER_FIELDS = (
     Field("previous_heading", "rad", "heading of the footprint before", is_odd=True),
     Field("place_x", "leg lengths", "contact reference point of the stance foot, downhill"),
     Field("place_z", "leg lengths", "the same to the right", is_odd=True),
-    Field("time", "time units", "since the start of the episode"),
+    Field("time", "time units", "since the start of the episode, to the horizon"),
     Field("steps", "", "since the start of the episode", "i8"),
     Field(
         "distance",
         "leg lengths",
-        "sum of the steps' advances along the mean heading of their two footprints",
+        "sum of the steps' advances along the mean heading of their two footprints, to the horizon",
     ),
-    Field("work", _WORK, "sum of the steps' positive work of moving the masses"),
+    Field("work", _WORK, "sum of the steps' positive work of moving the masses, to the horizon"),
     # --- the last step
     Field("inter_leg_angle", "rad", "commanded in the last step"),
     Field("commanded_offset", "leg lengths", "commanded in the last step", is_odd=True),
     Field("effort", "", "mean square of the last action's two numbers, each within [-1, 1]"),
     Field("fall", "", "how the last step ended, a ``FallCode``; 0 if it was completed", "i8"),
     Field("duration", "time units", "of the last step"),
+    Field(
+        "share", "", "of the last step's duration, before the horizon: 1 but in the step across it"
+    ),
     Field(
         "advance",
         "leg lengths",

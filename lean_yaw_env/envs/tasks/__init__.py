@@ -18,7 +18,7 @@ TASKS = {
 
 
 def task_named(task: str | Task) -> Task:
-    """The task of a name ("Heading") or an environment id ("LeanYaw/Heading-v0"); a task is returned as it is.
+    """The task of a name ("Heading") or an environment id ("LeanYaw/Heading-v1"); a task is returned as it is.
 
     Raises
     ------

@@ -13,7 +13,7 @@ import numpy as np
 from lean_yaw_env.envs.state import WALKER_FIELDS, Field, Records, record_type
 from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.parameters import Range, Vector, WalkerParameters
-from lean_yaw_env.validation import require_instance, require_mapping
+from lean_yaw_env.validation import require_flag, require_instance, require_mapping
 
 Formula = Callable[[Any, Any], Any]
 """Of a walker's record and the task's; decorated by ``formula``."""
@@ -40,6 +40,10 @@ def observe_nothing(walker: Any, task: Any) -> Any:
     """The features of a task that has none."""
     return ()
 
+
+FIRST = "0: the first."
+TO_THE_HORIZON = "the step across the horizon is paid, and counted in metrics, to the horizon alone"
+"""What version 1 changed in every task of the package."""
 
 TASK_RANGES = (
     Range("horizon", 0.0, math.inf, "(]"),
@@ -104,14 +108,14 @@ class Task:
     name: str
     """The middle of its environment id."""
     reward: Formula
-    """Of a step that was no fall, from records after the step and before ``update``."""
+    """Of a step that was no fall, from records after the step and before ``update``. The environment pays its ``share`` before the horizon."""
     metrics: dict[str, Metric]
     """Success metrics, apart from reward."""
     summary: str
     """For the documents: what the walker must do."""
     reward_text: str
     """For the documents: the reward's rate per unit of time."""
-    history: tuple[str, ...] = ("0: the first.",)
+    history: tuple[str, ...] = (FIRST,)
     """For the documents: a sentence for each version."""
     fields: tuple[Field, ...] = ()
     """The task's record, each field at its initial value before ``start``."""
@@ -144,6 +148,8 @@ class Task:
     """Episodes start in the gait driven by this offset, away from the stance foot; 0 is the gait that the slope drives."""
     headline: str = "return"
     """The metric, or "return", by which agents are compared: it must be meaningful without survival."""
+    is_ranked: bool = True
+    """Whether agents are compared on it; False for a smoke test."""
 
     def __post_init__(self) -> None:
         for name in ("metrics", "commands"):
@@ -153,6 +159,7 @@ class Task:
         ):
             raise ValueError(f"fields must be of the class Field, got {self.fields!r}")
         require_instance("parameters", self.parameters, WalkerParameters)
+        require_flag("is_ranked", self.is_ranked)
         for limits in (*TASK_RANGES, _PUMPING, _GOAL_RADIUS):
             limits.require(getattr(self, limits.name))
         common = {field.name for field in WALKER_FIELDS}

@@ -7,7 +7,7 @@ from typing import Any
 
 from lean_yaw_env.envs.dynamics import ANKLE_PUSH, PITCH_PUSH
 from lean_yaw_env.envs.state import Field
-from lean_yaw_env.envs.tasks.task import Metric, Task
+from lean_yaw_env.envs.tasks.task import FIRST, TO_THE_HORIZON, Metric, Task
 from lean_yaw_env.kernel.compilation import formula
 
 # Reward per unit of time: for walking, and against large actions.
@@ -29,8 +29,10 @@ WALK = Task(
         "time_walked": Metric("time", None, "units of time", "higher"),
         "distance": Metric("distance", None, "leg lengths, along the headings", "higher"),
     },
-    summary="Keep walking; nothing is commanded.",
+    summary="Keep walking; nothing is commanded. A smoke test, which ranks nobody.",
     reward_text=f"{WALKING_RATE} - {EFFORT_RATE} effort",
+    history=(FIRST, f"1: {TO_THE_HORIZON}."),
+    is_ranked=False,
 )
 
 
@@ -56,4 +58,5 @@ PUSH = replace(
     max_offset_change=0.1,  # a small one would limit how hard a push can be met
     push_level=0.5,
     headline="survived_200_steps",
+    is_ranked=True,
 )

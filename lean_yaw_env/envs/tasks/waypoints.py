@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from lean_yaw_env.envs.formulas import direction, mean_heading, place
+from lean_yaw_env.envs.formulas import direction, ends_in_time, mean_heading, place
 from lean_yaw_env.envs.state import Field
-from lean_yaw_env.envs.tasks.task import Command, Feature, Metric, Task
+from lean_yaw_env.envs.tasks.task import FIRST, TO_THE_HORIZON, Command, Feature, Metric, Task
 from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.kernel.random import uniform
 from lean_yaw_env.parameters import WalkerParameters
@@ -43,6 +43,12 @@ def goal_distance(walker: Any, task: Any) -> Any:
 
 
 @formula
+def is_reached(walker: Any, task: Any) -> bool:
+    """Whether the last step came to the goal, before the horizon."""
+    return ends_in_time(walker) and goal_distance(walker, task).real <= RADIUS
+
+
+@formula
 def goal_bearing(walker: Any, task: Any) -> Any:
     """How far the goal is to the left of straight ahead, rad."""
     x, z = to_goal(walker, task)
@@ -72,7 +78,7 @@ def reward(walker: Any, task: Any) -> Any:
 
 @formula
 def update(walker: Any, task: Any) -> bool:
-    if goal_distance(walker, task) <= RADIUS:
+    if is_reached(walker, task):
         task.goals += 1
         start(walker, task)
     return False
@@ -120,6 +126,7 @@ WAYPOINT = Task(
     "held, 0.05, the walker turns on a radius of 8.2 at the inter-leg angle of 0.3, of 38 at 0.15, 4.1 at 0.36 and 2.3 at 0.39; at 0.42 it "
     "trips.",
     reward_text=f"{WALKING_RATE} + {APPROACH:g} (speed of approach to the goal) - {EFFORT_RATE} effort",
+    history=(FIRST, f"1: a goal reached after the horizon does not count; {TO_THE_HORIZON}."),
     commands={
         "goal": Command(
             ("goal_x", "goal_z"), -FARTHEST_COMMAND, FARTHEST_COMMAND, "place of the first goal"
@@ -135,12 +142,12 @@ WAYPOINT = Task(
 
 @formula
 def goal_reward(walker: Any, task: Any) -> Any:
-    return 1.0 if goal_distance(walker, task).real <= RADIUS else 0.0
+    return 1.0 if is_reached(walker, task) else 0.0
 
 
 @formula
 def goal_update(walker: Any, task: Any) -> bool:
-    if goal_distance(walker, task) <= RADIUS:
+    if is_reached(walker, task):
         task.reached = 1
     return task.reached != 0
 
