@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import csv
 import importlib
 import inspect
 import re
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
+ROOT = Path(__file__).resolve().parents[1]
 MARK = re.compile(r"^<!-- from code: (\w+) (\S+) -->$", re.MULTILINE)
 PACKAGES = (
     "lean_yaw_env", "lean_yaw_env.passive", "lean_yaw_env.analysis", "lean_yaw_env.envs", "lean_yaw_env.envs.tasks", "lean_yaw_env.envs.sb3",
@@ -116,4 +119,41 @@ def commands(program: str) -> str:
     return text.split("\n", 1)[1].replace("```console\n$ ", "```\n")
 
 
-MAKERS: dict[str, Callable[[str], str]] = {"reference": reference, "commands": commands}
+def gallery(results: str) -> str:
+    """A section for each task: what it asks, its film, how to make it, and the scores of the agents in a file of results."""
+    from lean_yaw_env.envs.tasks import TASKS
+    from lean_yaw_env.registration import NAMESPACE, TASK_VERSIONS
+
+    with (ROOT / results).open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    sections = []
+    for name, version in TASK_VERSIONS.items():
+        task, env_id = TASKS[name], f"{NAMESPACE}/{name}-v{version}"
+        scored = [row for row in rows if (row["task"], row["metric"]) == (name, task.headline)]
+        scored.sort(key=lambda row: -float(row["mean"]))
+        scores = [
+            f"| {row['agent']} | {float(row['mean']):.4g} | {float(row['low']):.4g} to {float(row['high']):.4g} |"
+            for row in scored
+        ]
+        table = [
+            f"| agent | mean {task.headline.replace('_', ' ')} | 95 % |",
+            "|---|---:|---|",
+            *scores,
+        ]
+        film = f'<video src="films/{name.lower()}.mp4" controls loop muted playsinline preload="metadata"></video>'
+        code = f'env = gymnasium.make("lean_yaw_env:{env_id}")'
+        parts = [
+            f"## {name}",
+            task.summary,
+            f"```{{raw}} html\n{film}\n```",
+            f"```python\n{code}\n```",
+        ]
+        sections += [*parts, "\n".join(table) if scores else "No scores yet."]
+    return "\n\n".join(sections)
+
+
+MAKERS: dict[str, Callable[[str], str]] = {
+    "reference": reference,
+    "commands": commands,
+    "gallery": gallery,
+}
