@@ -27,7 +27,7 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
 ]
-exclude_patterns = ["build", "_cache"]
+exclude_patterns = ["build", "_cache", "jupyter_execute"]
 highlight_language = "none"
 python_maximum_signature_line_length = 88
 

@@ -122,13 +122,13 @@ def commands(program: str) -> str:
 def gallery(results: str) -> str:
     """A section for each task: what it asks, its film, how to make it, and the scores of the agents in a file of results."""
     from lean_yaw_env.envs.tasks import TASKS
-    from lean_yaw_env.registration import NAMESPACE, TASK_VERSIONS
+    from lean_yaw_env.registration import ALL_ENV_IDS, ALL_TASKS
 
     with (ROOT / results).open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     sections = []
-    for name, version in TASK_VERSIONS.items():
-        task, env_id = TASKS[name], f"{NAMESPACE}/{name}-v{version}"
+    for name, env_id in zip(ALL_TASKS, ALL_ENV_IDS, strict=True):
+        task = TASKS[name]
         scored = [row for row in rows if (row["task"], row["metric"]) == (name, task.headline)]
         scored.sort(key=lambda row: -float(row["mean"]))
         scores = [

@@ -7,29 +7,25 @@ import sys
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent
+ROOT = DOCS.parent
 BUILD = DOCS / "build"
 
 
+FILM = [sys.executable, "-m", "agents", "film", "--format", "mp4", "--fps", "20", "--out"]
+"""For a folder, and then a task and an agent."""
+
+
 def main() -> None:
-    """Films and report are made while the notebooks run; what is there already is kept."""
-    python = sys.executable
-    films = [
-        python,
-        "-m",
-        "agents",
-        "film",
-        "--task",
-        "all",
-        "--format",
-        "mp4",
-        "--fps",
-        "20",
-        "--out",
-        f"{BUILD}/films",
+    """Films and report are made while the notebooks run; those that are there already are kept."""
+    python, films = sys.executable, str(BUILD / "films")
+    work = {
+        BUILD / "films" / "heading.mp4": [*FILM, films, "--task", "all", "--agent", "ppo"],
+        BUILD / "films" / "waypointgoal.mp4": [*FILM, films, "--task", "WaypointGoal", "--agent", "her"],
+        BUILD / "report": [python, "-m", "lean_yaw_env.cli", "reproduce", "all", "--out", f"{BUILD}/report"],
+    }  # fmt: skip
+    running = [
+        subprocess.Popen(command, cwd=ROOT) for made, command in work.items() if not made.exists()
     ]
-    report = [python, "-m", "lean_yaw_env.cli", "reproduce", "all", "--out", f"{BUILD}/report"]
-    missing = [work for work in (films, report) if not Path(work[-1]).exists()]
-    running = [subprocess.Popen(work, cwd=DOCS.parent) for work in missing]
     sphinx = [
         python,
         "-m",

@@ -10,7 +10,10 @@ from lean_yaw_env.validation import require_finite
 NAMESPACE = "LeanYaw"
 
 SUITE_VERSION = 1
-_TASKS = ("Heading", "Walk", "SpeedHeading", "Waypoint", "Slalom", "Push", "UTurn", "Level")
+_TASKS = (
+    "Heading", "Walk", "SpeedHeading", "Waypoint", "Slalom", "Metastable", "UTurn", "Level",
+    "LevelUphill", "Energy", "UnknownBody", "Race", "Hills",
+)  # fmt: skip
 TASK_VERSIONS = dict.fromkeys(_TASKS, SUITE_VERSION)
 """Every task's name and version; ``envs.tasks`` defines the tasks."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -153,6 +154,20 @@ def test_pushes_of_the_training_are_no_part_of_what_the_policy_is_for():
     assert not np.array_equal(
         calm.weights["observation_variance"], shaken.weights["observation_variance"]
     )
+
+
+def test_a_training_of_shorter_episodes_is_for_the_environment_s_own():
+    settings = replace(TINY, horizon=6.0)
+    trained = train_agent("ppo", ID, settings, progress=False)
+    assert trained.policy.card.options == EnvOptions()
+    assert trained.log.lengths.max() < 12  # steps of 0.73 or so
+    assert trained.log.survived.any()
+
+
+def test_training_leaves_no_folder_behind(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    train_agent("ppo", ID, replace(TINY, steps=256), progress=False)
+    assert not list(tmp_path.iterdir())
 
 
 def test_training_leaves_torch_s_threads_as_they_were():

@@ -90,7 +90,7 @@ COMMANDS: dict[tuple[str, str], tuple[list[str], dict[str, tuple[str, ...]]]] = 
         },
     ),
     ("agents", "capture"): (
-        ["--agents", "fixed", "--task", "Push", "--starts", "1", "--points", "2"],
+        ["--agents", "fixed", "--task", "Metastable", "--starts", "1", "--points", "2"],
         {
             "--task": TEXT, "--agents": TEXT, "--out": (), "--agent-path": ("no-such-folder",), "--runs": (), "--starts": COUNT,
             "--points": COUNT, "--friction-limit": POSITIVE,

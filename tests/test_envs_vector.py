@@ -484,7 +484,7 @@ def test_too_many_walkers_to_draw_are_refused() -> None:
 
 
 def test_tensors_share_the_arrays_memory() -> None:
-    env = gym.wrappers.vector.NumpyToTorch(gym.make_vec("LeanYaw/Push-v1", num_envs=4))
+    env = gym.wrappers.vector.NumpyToTorch(gym.make_vec("LeanYaw/Metastable-v1", num_envs=4))
     observations, info = env.reset(seed=1)
     assert observations.dtype == torch.float32
     for _ in range(20):
@@ -494,7 +494,7 @@ def test_tensors_share_the_arrays_memory() -> None:
     assert rewards.dtype == torch.float64
     assert terminated.dtype == torch.bool
     lean = gym.wrappers.vector.NumpyToTorch(
-        gym.make_vec("LeanYaw/Push-v1", num_envs=4, copy=False, step_info=False)
+        gym.make_vec("LeanYaw/Metastable-v1", num_envs=4, copy=False, step_info=False)
     )
     observations, _ = lean.reset(seed=1)
     own = lean.unwrapped

@@ -70,9 +70,9 @@ def test_an_id_s_task_cannot_be_changed(make) -> None:
 
 @pytest.mark.parametrize("kind", [WalkerEnv, partial(WalkerVectorEnv, 2), partial(WalkerVecEnv, 2)])
 def test_environments_take_the_ids_that_gymnasium_takes(kind) -> None:
-    for name in ("Push", "LeanYaw/Push-v1", "lean_yaw_env:LeanYaw/Push-v1"):
+    for name in ("Metastable", "LeanYaw/Metastable-v1", "lean_yaw_env:LeanYaw/Metastable-v1"):
         made = kind(task=name)
-        assert getattr(made, "walkers", made).task.name == "Push"
+        assert getattr(made, "walkers", made).task.name == "Metastable"
     with pytest.raises(
         ValueError, match=r"task must be one of .*, got 'Headin'; did you mean 'Heading'"
     ):

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from lean_yaw_env.envs.formulas import advance, mean_heading, positive
+from lean_yaw_env.envs.state import SLOPE
 from lean_yaw_env.kernel.batch import step_batch
 from lean_yaw_env.kernel.compilation import borrowed, entry_point, formula
 from lean_yaw_env.kernel.random import normal
@@ -125,6 +126,7 @@ def walk_one(walkers, bodies, settings, actions):
     walker, common = walkers[0], settings[0]
     if not (np.isfinite(actions[0, 0]) and np.isfinite(actions[0, 1])):
         return False
+    bodies[0, SLOPE] = walker.slope
     command(walker, common, actions[0])
     outcome = walking_step(
         body_of(bodies[0]),
@@ -161,7 +163,8 @@ def walk_many(walkers, bodies, settings, actions, skip, first, last):
     commands, sides = np.empty((size, 3)), np.empty(size)
     states, outcomes = np.empty((size, STATE_SIZE)), np.empty((size, OUTCOME_SIZE))
     owners = np.empty(size, dtype=np.int64)
-    own_bodies = np.empty((size if len(bodies) > 1 else 1, bodies.shape[1]))
+    one_each = len(bodies) == len(walkers)
+    own_bodies = np.empty((size if one_each else 1, bodies.shape[1]))
     for each in range(bodies.shape[1]):
         own_bodies[0, each] = bodies[0, each]
     i = first
@@ -172,7 +175,8 @@ def walk_many(walkers, bodies, settings, actions, skip, first, last):
                 walker = walkers[i]
                 command(walker, common, actions[i])
                 gather(walker, commands, states, sides, n)
-                if len(bodies) > 1:
+                if one_each:
+                    bodies[i, SLOPE] = walker.slope
                     for each in range(bodies.shape[1]):
                         own_bodies[n, each] = bodies[i, each]
                 owners[n] = i

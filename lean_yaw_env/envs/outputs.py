@@ -20,6 +20,7 @@ from lean_yaw_env.envs.observation import (
     corrupt,
     limited,
     mirror_sign,
+    show_body,
 )
 from lean_yaw_env.envs.tasks.task import Task
 from lean_yaw_env.kernel.compilation import borrowed, entry_point_with
@@ -73,6 +74,7 @@ def observe(observation, walker, task, settings):
         value = sign * values[k] if ODD[k] else values[k]
         observation[column] = limited((value - CENTRES[k]) / SCALES[k])
         column += 1
+    show_body(observation, column, walker, settings)
     corrupt(observation, walker, settings)
 
 
@@ -139,6 +141,7 @@ def compiled_for(
         [field[:5] for field in task.fields],
         tables,
         [info[:2] for info in infos_of(task)],
+        task.slope_varies,
     )
     key = (template, *formulas.values(), repr(contents))
     if key not in _COMPILED:

@@ -20,6 +20,8 @@ Records = NDArray[np.void]
 BODY_SIZE = 4
 BODY_NAMES = PARAMETER_NAMES[:BODY_SIZE]
 """What a random body draws."""
+SLOPE = BODY_NAMES.index("slope")
+"""The column of bodies that follows the walker's record from step to step."""
 
 
 class Field(NamedTuple):
@@ -86,7 +88,7 @@ WALKER_FIELDS = (
     Field("ankle_push", "rad / time unit", "the last push on the ankle rate", is_odd=True),
     # --- what lasts
     *(
-        Field(name, unit, "of this walker's body")
+        Field(name, unit, "of this walker's body" if name != "slope" else "under this walker")
         for name, unit in zip(BODY_NAMES, ("leg lengths", "leg lengths", "rad", "rad"), strict=True)
     ),
     Field("pending_angle", "rad", "inter-leg angle on its way, where actions are delayed"),
@@ -113,6 +115,7 @@ SETTINGS_FIELDS = (
     Field("start_disturbance", "", "scale of the start's random deviations"),
     Field("gait", "", "section state that episodes start near, on the left foot", size=STATE_SIZE),
     Field("gait_offset", "leg lengths", "mass offset in force in that state"),
+    Field("show_body", "", "whether the body is appended to the observation", "i8"),
     Field("random_body", "", "which bodies are drawn: a ``BodyDraw``", "i8"),
     Field("body_centre", "", "middle of the box of random bodies", size=BODY_SIZE),
     Field("body_reach", "", "half-widths of that box", size=BODY_SIZE),

@@ -7,8 +7,18 @@ from math import pi
 from typing import Any
 
 from lean_yaw_env.envs.formulas import closeness, counted_time, mean_heading, positive, wrapped
+from lean_yaw_env.envs.reset import BODY_DEVIATIONS
 from lean_yaw_env.envs.state import Field
-from lean_yaw_env.envs.tasks.task import FIRST, TO_THE_HORIZON, Command, Feature, Metric, Task
+from lean_yaw_env.envs.tasks.task import (
+    FIRST,
+    FRICTION_LIMIT,
+    NEW,
+    SINCE_VERSION_1,
+    Command,
+    Feature,
+    Metric,
+    Task,
+)
 from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.kernel.random import uniform
 from lean_yaw_env.parameters import WalkerParameters
@@ -128,18 +138,21 @@ HEADING = Task(
     summary=f"Walk where you are told: a heading within {LARGEST_SLOPE_COMMAND} rad of downhill, commanded anew every "
     f"{SHORTEST_COMMAND} to {LONGEST_COMMAND} units of time. The entry level.",
     reward_text=f"{WALKING_RATE} + {TRACKING_RATE} / (1 + (heading error / {TRACKING_WIDTH})^2) - {EFFORT_RATE} effort",
-    history=(FIRST, f"1: commands last a time, not a number of steps; {TO_THE_HORIZON}."),
+    history=(FIRST, f"1: commands last a time, not a number of steps; {SINCE_VERSION_1}."),
     commands={"command": Command(("command",), -pi, pi, "heading, rad")},
     heading_field="command",
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
 )
 
 UTURN = replace(
     HEADING,
     name="UTurn",
     fields=heading_fields(pi),
-    summary=f"Walk where you are told, all round: any heading, commanded anew every {SHORTEST_COMMAND} to {LONGEST_COMMAND} units of time. Across "
-    "the slope it gives no energy, and uphill it takes some; the masses may be moved as fast as in Level, to pump. An open challenge.",
+    summary=f"Walk where you are told, all round: any heading, commanded anew every {SHORTEST_COMMAND} to {LONGEST_COMMAND} units of time, "
+    "under pushes. Across the slope it gives no energy, and uphill it takes some; the masses may be moved as fast as in Level, to pump.",
+    history=(*HEADING.history[:-1], f"{HEADING.history[-1][:-1]}; pushes at level 0.2."),
     max_offset_change=0.1,
+    push_level=0.2,
 )
 
 # On a slope of 0.01 the gait walks at 0.68 with an inter-leg angle of 0.15 and at 0.25 with one of 0.45; 0.6 rad off downhill at 0.60
@@ -257,12 +270,35 @@ LEVEL = replace(
             "lower",
         ),
     },
-    summary="Walk on a level floor, or up a gentle slope (`slope=-0.005`), powered by nothing but moving the masses from side to side, and "
+    summary="Walk on a level floor, powered by nothing but moving the masses from side to side, and "
     f"steer: a heading within {LARGEST_SLOPE_COMMAND} rad, commanded anew every {SHORTEST_COMMAND} to {LONGEST_COMMAND} units of time. Episodes "
     f"start near the gait of offsets of {PUMPING} away from the stance foot.",
     reward_text=f"{WALKING_RATE} + {LEVEL_TRACKING_RATE} / (1 + (heading error / {TRACKING_WIDTH})^2) + {PROGRESS} speed - {WORK_PRICE:g} "
     "(power put into moving the masses)",
-    parameters=WalkerParameters(slope=0.0),
+    parameters=WalkerParameters(slope=0.0, friction_limit=FRICTION_LIMIT),
     max_offset_change=0.1,
     pumping=PUMPING,
+)
+
+UPHILL = -0.01
+
+LEVEL_UPHILL = replace(
+    LEVEL,
+    name="LevelUphill",
+    summary=f"Level on a floor that rises: walk up a slope of {-UPHILL} rad, powered by nothing but moving the masses from side to side, and "
+    f"steer as in Level, either side of straight up the slope.",
+    history=NEW,
+    parameters=WalkerParameters(slope=UPHILL, friction_limit=FRICTION_LIMIT),
+)
+
+UNKNOWN_BODY = replace(
+    HEADING,
+    name="UnknownBody",
+    summary="Heading with a body that you do not know: drawn anew for each episode from a box twice as wide as that of other tasks, and with both "
+    "rates hidden. It must be learned from how the walker moves, in memory of past observations; an oracle sees it (`show_body=True`).",
+    history=NEW,
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
+    hidden_rates=True,
+    random_body="training",
+    body_reach=tuple(2.0 * reach for reach in BODY_DEVIATIONS),
 )

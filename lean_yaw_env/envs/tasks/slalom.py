@@ -9,10 +9,17 @@ import numpy as np
 
 from lean_yaw_env.envs.formulas import counted_time, mean_heading, place, wrapped
 from lean_yaw_env.envs.state import Field
-from lean_yaw_env.envs.tasks.task import FIRST, TO_THE_HORIZON, Feature, Metric, Task
+from lean_yaw_env.envs.tasks.task import (
+    FIRST,
+    FRICTION_LIMIT,
+    SINCE_VERSION_1,
+    Feature,
+    Metric,
+    Task,
+)
 from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.kernel.random import uniform
-from lean_yaw_env.parameters import Vector
+from lean_yaw_env.parameters import Vector, WalkerParameters
 
 # The path: the sum of height (1 - cos(wave number x)) to the right, x downhill. It starts where the walker does, straight downhill.
 WAVES = 3
@@ -175,8 +182,9 @@ SLALOM = Task(
     summary=f"Follow a path downhill, the sum of {WAVES} waves of random length ({SHORTEST_WAVE:g} to {LONGEST_WAVE:g} leg lengths), with "
     f"slopes to {GREATEST_SLOPE} and curvature to {GREATEST_CURVATURE}, under pushes.",
     reward_text=f"{WALKING_RATE} + {TRACKING_RATE} / (1 + (cross-track error / {TRACKING_WIDTH})^2) - {EFFORT_RATE} effort",
-    history=(FIRST, f"1: {TO_THE_HORIZON}."),
+    history=(FIRST, f"1: the push level is 0.4 in place of 0.2; {SINCE_VERSION_1}."),
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
     ends=f"a cross-track error beyond {LARGEST_ERROR:g}, as a termination without reward",
     reference_path=reference_path,
-    push_level=0.2,
+    push_level=0.4,
 )

@@ -10,11 +10,24 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from lean_yaw_env.envs.state import WALKER_FIELDS, Field, Records, record_type
+from lean_yaw_env.envs.reset import BODY_DEVIATIONS, BodyDraw
+from lean_yaw_env.envs.state import BODY_SIZE, WALKER_FIELDS, Field, Records, record_type
 from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.parameters import Range, Vector, WalkerParameters
-from lean_yaw_env.validation import require_flag, require_instance, require_mapping
+from lean_yaw_env.validation import (
+    require_array,
+    require_choice,
+    require_flag,
+    require_instance,
+    require_mapping,
+)
 
+RandomBody = Literal["nominal", "training", "held-out"]
+BODY_DRAWS: dict[RandomBody, BodyDraw] = {
+    "nominal": BodyDraw.NOMINAL,
+    "training": BodyDraw.TRAINING,
+    "held-out": BodyDraw.HELD_OUT,
+}
 Formula = Callable[[Any, Any], Any]
 """Of a walker's record and the task's; decorated by ``formula``."""
 
@@ -42,8 +55,12 @@ def observe_nothing(walker: Any, task: Any) -> Any:
 
 
 FIRST = "0: the first."
-TO_THE_HORIZON = "the step across the horizon is paid, and counted in metrics, to the horizon alone"
+FRICTION_LIMIT = 0.6
+"""Friction limit of the tasks of this package: the least that tables give for rubber on dry concrete, 0.6 to 0.85."""
+SINCE_VERSION_1 = f"the friction limit is {FRICTION_LIMIT}; the step across the horizon is paid, and counted in metrics, to the horizon alone"
 """What version 1 changed in every task of the package."""
+NEW = ("1: the first.",)
+"""The history of a task that came with version 1."""
 
 TASK_RANGES = (
     Range("horizon", 0.0, math.inf, "(]"),
@@ -144,6 +161,12 @@ class Task:
     horizon: float = 200.0
     max_offset_change: float = 0.005
     push_level: float = 0.0
+    hidden_rates: bool = False
+    random_body: RandomBody = "nominal"
+    body_reach: tuple[float, ...] = BODY_DEVIATIONS
+    """Half-widths of the box from which random bodies are drawn, shape (4,)."""
+    slope_varies: bool = False
+    """The slope under a walker changes from step to step: ``refresh`` sets its field ``slope``, on which it walks the next step."""
     pumping: float = 0.0
     """Episodes start in the gait driven by this offset, away from the stance foot; 0 is the gait that the slope drives."""
     headline: str = "return"
@@ -159,9 +182,12 @@ class Task:
         ):
             raise ValueError(f"fields must be of the class Field, got {self.fields!r}")
         require_instance("parameters", self.parameters, WalkerParameters)
-        require_flag("is_ranked", self.is_ranked)
         for limits in (*TASK_RANGES, _PUMPING, _GOAL_RADIUS):
             limits.require(getattr(self, limits.name))
+        for name in ("hidden_rates", "slope_varies", "is_ranked"):
+            require_flag(name, getattr(self, name))
+        require_choice("random_body", self.random_body, BODY_DRAWS)
+        require_array("body_reach", self.body_reach, (BODY_SIZE,), 0.0, 1.0, "(]")
         common = {field.name for field in WALKER_FIELDS}
         own = {field.name for field in self.fields}
         if common & own:
