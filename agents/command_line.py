@@ -440,7 +440,7 @@ def capture(
 def film(
     task: Annotated[str, Option(help="A task's name, or all.")] = ALL,
     agent: Annotated[str, Option(help="The agent. If it was not trained for a task, lqr is filmed instead.")] = "ppo",
-    out: Annotated[Path, Option(help="Folder for <task>.gif.")] = Path("docs/videos"),
+    out: Annotated[Path, Option(help="Folder for <task>.gif.")] = Path("films"),
     seed: Annotated[int, Option(help="Another number films other episodes.")] = 0,
     seconds: Annotated[float, Option(help="Of each film.")] = 11.0,
     speed: Annotated[float, Option(help="Times real time for legs of a metre.")] = 2.0,
