@@ -154,10 +154,10 @@ def retrain(
 
 @_command("tune")
 def tune(
-    agent: Annotated[str, Argument(help="feedback, lqr, mpc, ppo or sac.")],
+    agent: Annotated[str, Argument(help="feedback, lqr, ppo or sac.")],
     task: Annotated[str, Argument(help="The task's name.")],
     trials: Annotated[int, Option(help="Total number of trials, including those in the study already.")] = 100,
-    episodes: Annotated[int | None, Option(help="Episodes that settings are scored on; 128 for feedback and lqr, 24 for mpc, 512 for learners "
+    episodes: Annotated[int | None, Option(help="Episodes that settings are scored on; 128 for feedback and lqr, 512 for learners "
         "otherwise.")] = None,
     horizon: Annotated[float | None, Option(help="Length of these episodes, of controllers; the task's otherwise.")] = None,
     steps: Annotated[int | None, Option(help="Steps of each training, of learners; the task's own number otherwise.")] = None,
@@ -307,6 +307,37 @@ def command_as_typed() -> str:
     return shlex.join(["python", "-m", str(__package__), *sys.argv[1:]])
 
 
+@_command("reference")
+def reference(
+    task: Tasks = None,
+    episodes: Annotated[int, Option(help="Validation episodes that are searched.")] = 32,
+    again: Annotated[bool, Option("--again", help="Search also for tasks that the file has a reference of.")] = False,
+    processes: Annotated[int, Option(min=1, help="Processes, each at a task of its own.")] = 1,
+    out: Annotated[Path | None, Option(help="JSON file of references; the package's own otherwise.")] = None,
+) -> None:  # fmt: skip
+    """Search for each task's reference score by planning that sees the future: normalised scores call it 1. Finished tasks are kept."""
+    from concurrent.futures import as_completed
+
+    from .evaluation.plan import worker_pool
+    from .evaluation.reference_search import find_reference, write_reference
+    from .references import FILE, read_references
+
+    file = FILE if out is None else out
+    keep(f"finished tasks are in {file}; {AGAIN}")
+    kept = read_references(file)
+    wanted = [each for each in tasks_in(task or ["Heading"]) if again or each not in kept]
+    with worker_pool(processes) as pool:
+        begun = {
+            pool.submit(find_reference, each, episodes, f"python -m {__package__} reference --task {each} --again"): each
+            for each in wanted
+        }  # fmt: skip
+        for future in as_completed(begun):
+            found, name = future.result(), begun[future]
+            write_reference(file, name, found)
+            typer.echo(f"{name}: fixed {found.fixed:.2f}, {found.base} {found.base_value:.2f}, reference {found.value:.2f}, "
+                f"+- {found.standard_error:.2f}, in {found.seconds:.0f} s")  # fmt: skip
+
+
 @_command("robustness")
 def robustness(
     task: Tasks = None,
@@ -428,7 +459,7 @@ def capture(
 def film(
     task: Annotated[str, Option(help="A task's name, or all.")] = ALL,
     agent: Annotated[str, Option(help="The agent. If it was not trained for a task, lqr is filmed instead.")] = "ppo",
-    out: Annotated[Path, Option(help="Folder for <task>.gif.")] = Path("docs/videos"),
+    out: Annotated[Path, Option(help="Folder for <task>.gif.")] = Path("films"),
     seed: Annotated[int, Option(help="Another number films other episodes.")] = 0,
     seconds: Annotated[float, Option(help="Of each film.")] = 11.0,
     speed: Annotated[float, Option(help="Times real time for legs of a metre.")] = 2.0,

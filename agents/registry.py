@@ -22,6 +22,7 @@ from lean_yaw_env.validation import (
 
 from .agent import Agent
 from .controllers.guidance import guided
+from .controllers.linear import LinearLaw
 from .controllers.mpc import MpcController
 from .controllers.simple import FixedController, HeadingFeedback, RandomController
 from .observations import ObservationLayout
@@ -94,8 +95,27 @@ def _lqr(request: AgentRequest) -> Agent:
     return guided("Waypoint" if task == GOAL_TASK else task, request.options)
 
 
+def _linear(request: AgentRequest) -> Agent:
+    return LinearLaw(task_of(request.env_id), request.options)
+
+
 def _mpc(request: AgentRequest) -> Agent:
-    return MpcController(task_of(request.env_id), request.options, seed=request.seed)
+    task, base = task_of(request.env_id), make_base(request)[1]
+    return MpcController(task, request.options, base, seed=request.seed)
+
+
+def make_base(request: AgentRequest) -> tuple[str, Agent]:
+    """The agent that planners deviate from, with its name: the package's PPO; without one for these observations the regulator, or without a gait the
+    fixed controller."""
+    task = task_of(request.env_id)
+    for seed in shipped_seeds(request.env_id, "ppo")[:1]:
+        policy = load(shipped_folder(request.env_id, "ppo", seed), env_id=request.env_id)
+        if policy.card.layout == ObservationLayout.of(task, request.options):
+            return "ppo", policy
+    try:
+        return "lqr", guided(task, request.options)
+    except NoGaitError:
+        return "fixed", FixedController()
 
 
 def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
@@ -117,6 +137,7 @@ AGENTS: dict[str, AgentEntry] = {
     "fixed": AgentEntry("baseline", lambda asked: FixedController(_layout(asked))),
     "feedback": AgentEntry("feedback", _feedback, _STEERED),
     "lqr": AgentEntry("feedback", _lqr),
+    "linear": AgentEntry("feedback", _linear, tuple(all_settings().get("linear", {}))),
     "mpc": AgentEntry("planner", _mpc, tuple(TASK_VERSIONS)),
     "ppo": AgentEntry("learned", _trained("ppo")),
     "sac": AgentEntry("learned", _trained("sac")),

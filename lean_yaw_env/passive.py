@@ -100,6 +100,11 @@ class PassiveWalker:
     planar : bool
         Heading and ankle locked at zero, as in two dimensions; hip width then plays no part.
         The locked motion is that of the free walker without hip width, started without lean.
+
+    Raises
+    ------
+    ValueError
+        If a planar walker has a spring or a damper in its ankle, which is locked.
     """
 
     parameters: WalkerParameters
@@ -107,7 +112,13 @@ class PassiveWalker:
 
     def __post_init__(self) -> None:
         require_instance("parameters", self.parameters, WalkerParameters)
-        require_flag("planar", self.planar)
+        if require_flag("planar", self.planar):
+            for name in ("ankle_stiffness", "ankle_damping"):
+                value = getattr(self.parameters, name)
+                if value != 0.0:
+                    raise ValueError(
+                        f"{name} of a planar walker must be 0, since its ankle is locked, got {value!r}"
+                    )
 
     @property
     def moving_parameters(self) -> WalkerParameters:

@@ -80,6 +80,13 @@ def test_map_of_pumping_spreads_from_one_gait_to_where_the_slope_gives_nothing()
     assert np.isnan(float(here.eigenvalue_real[-1]))  # the heading has no multiplier there
 
 
+def test_map_of_pumping_on_the_level_does_not_need_a_gait_at_its_first_point() -> None:
+    result = stability_map(
+        Walker(WalkerParameters(slope=0.0)), {"alternating_offset": [0.002, 0.004, 0.02, 0.03]}
+    )
+    assert result.status.values.tolist() == [2, 2, 1, 1]
+
+
 def test_map_of_turning_walkers_has_the_speed_of_both_feet() -> None:
     walker = Walker(WalkerParameters(slope_turns=True))
     result = stability_map(walker, {"mass_offset": np.linspace(-0.05, 0.05, 9)})

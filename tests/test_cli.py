@@ -17,8 +17,8 @@ from lean_yaw_env import Walker, WalkerParameters, find_limit_cycle
 from lean_yaw_env.analysis import basin, stability_map
 from lean_yaw_env.cli.app import app
 from lean_yaw_env.cli.commands import parse_axes, parse_range
-from lean_yaw_env.cli.plots import basin_figure, gait_figure, map_figure
 from lean_yaw_env.cli.records import as_json, text_of
+from lean_yaw_env.plots import basin_figure, gait_figure, map_figure
 from lean_yaw_env.vehicles import BENCHMARK_2007, benchmark_bicycle
 
 COMMANDS = ("gait", "map", "basin", "bicycle", "skateboard", "reproduce", "play", "view")

@@ -8,7 +8,12 @@ from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 from scipy.interpolate import make_interp_spline
 
-from lean_yaw_env.analysis import find_limit_cycle, find_passive_gaits, section_map_of
+from lean_yaw_env.analysis import (
+    find_limit_cycle,
+    find_passive_gaits,
+    section_map_of,
+    stability_map,
+)
 from lean_yaw_env.kernel.passive import INPUTS, PassiveOutcome, passive_batch, passive_jacobian
 from lean_yaw_env.kernel.records import FAILED, STEPPED, Body
 from lean_yaw_env.multibody import MultibodyWalker
@@ -411,6 +416,16 @@ def test_bad_states_are_refused_by_name(state, message: str) -> None:
 def test_planar_walker_refuses_a_lean() -> None:
     with pytest.raises(ValueError, match="planar walker's heading, ankle_angle and ankle_rate"):
         POINT_FEET.step([0.1, 0.2, 0.0, -0.2, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("name", ["ankle_stiffness", "ankle_damping"])
+def test_planar_walker_refuses_what_its_locked_ankle_would_not_feel(name: str) -> None:
+    parameters = WalkerParameters(0.0, 0.0, 0.5, 0.004, **{name: 0.1})
+    with pytest.raises(ValueError, match=f"{name} of a planar walker must be 0, .* got 0.1"):
+        PassiveWalker(parameters, planar=True)
+    with pytest.raises(ValueError, match=f"{name} of a planar walker must be 0"):
+        stability_map(POINT_FEET, {name: [0.0, 0.1]})
+    assert PassiveWalker(parameters).parameters == parameters
 
 
 def test_other_bad_input_is_refused() -> None:

@@ -39,10 +39,14 @@ STATED_RATES: dict[str, Rate] = {
     "SpeedHeading": _heading,
     "Waypoint": lambda speed, work, effort: 0.5 + speed - 0.05 * effort,
     "Slalom": _heading,
-    "Push": _heading,
+    "Metastable": _heading,
     "UTurn": _heading,
     "Level": _level,
     "LevelUphill": _level,
+    "Energy": lambda speed, work, effort: 1.0 - 20.0 * work / speed,
+    "UnknownBody": _heading,
+    "Race": lambda speed, work, effort: speed,
+    "Hills": _heading,
 }
 """What each task states that it pays per unit of time for a straight walk with no error, from speed, power and effort: what a speed is
 worth is in the statement, what a step's length is worth is in none."""
@@ -73,7 +77,9 @@ def aim_ahead(simulation: Simulation) -> None:
 def test_short_and_long_steps_earn_what_the_task_states_and_no_more(task: str) -> None:
     pumping = 0.5 if task_named(task).pumping else 0.0
     for angle in ANGLES:
-        env = WalkerVectorEnv(2, task, push_level=0.0, start_disturbance=0.0, horizon=math.inf)
+        env = WalkerVectorEnv(
+            2, task, push_level=0.0, start_disturbance=0.0, horizon=math.inf, random_body="nominal"
+        )
         env.reset(seed=0)
         action = np.tile(np.float32([angle, pumping]), (2, 1))
         simulation = env.simulation

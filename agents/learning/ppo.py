@@ -38,7 +38,7 @@ class PPOSettings(LearnerSettings):
     frames : latest observations that the networks see; 1 sees no memory
     """
 
-    steps: int = 2_000_000
+    steps: int = 1_200_000
     walkers: int = 256
     steps_per_update: int = 128
     batch_size: int = 2048

@@ -50,6 +50,8 @@ Columns = dict[str, NDArray[Any]]
 
 _CHUNK = 2048
 """Points at a time: what is needed beside the result does not grow with their number."""
+_STARTS = 8
+"""Walkers that only pumping drives, among those of a chunk, for which a gait is looked for anew until one is found."""
 _NEAR = 0.1
 """A gait found from a neighbour's is its continuation if no coordinate differs by more."""
 
@@ -236,10 +238,15 @@ def _at_once(
     values = _columns(section_map, grid, follow_grid(grid, starts))
     # where only pumping drives the walker: one gait, from which neighbours are found
     pumped = np.isnan(starts[:, 3]) & (grid.offsets[:, 0] != grid.offsets[:, 1])
-    for i in np.flatnonzero(pumped)[:1]:
+    candidates = np.flatnonzero(pumped)
+    for i in candidates[
+        np.linspace(0, candidates.size - 1, min(candidates.size, _STARTS), dtype=int)
+    ]:
         here = {name: array[i : i + 1] for name, array in points.items()}
         for name, rows in _one_by_one(section_map, here, None).items():
             values[name][i] = rows[0]
+        if values["status"][i] == FOUND:
+            break
     return values
 
 

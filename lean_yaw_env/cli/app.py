@@ -12,7 +12,8 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from lean_yaw_env.cli import plots, records
+from lean_yaw_env import plots
+from lean_yaw_env.cli import records
 from lean_yaw_env.cli.commands import Output, add_command, parse_axes, parse_range
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.passive import PassiveWalker

@@ -1,4 +1,4 @@
-"""Hills: follow a commanded heading where the slope varies along the way, and is seen some steps ahead."""
+"""Hills: follow a commanded heading and speed where the slope varies along the way, and is seen some steps ahead."""
 
 from __future__ import annotations
 
@@ -11,10 +11,14 @@ import numpy as np
 from lean_yaw_env.envs.formulas import place
 from lean_yaw_env.envs.state import Field
 from lean_yaw_env.envs.tasks.headings import (
-    HEADING,
+    GREATEST_SPEED,
     LARGEST_SLOPE_COMMAND,
-    heading_features,
-    new_heading,
+    LEAST_SPEED,
+    LONGEST_COMMAND,
+    SHORTEST_COMMAND,
+    SPEED_HEADING,
+    new_heading_and_speed,
+    speed_features,
 )
 from lean_yaw_env.envs.tasks.task import FRICTION_LIMIT, NEW, Feature
 from lean_yaw_env.kernel.compilation import formula
@@ -24,9 +28,9 @@ from lean_yaw_env.parameters import WalkerParameters
 # The slope: its mean plus the sum of height sin(wave number x + phase), x downhill.
 WAVES = 3
 SHORTEST_WAVE, LONGEST_WAVE = 8.0, 30.0  # leg lengths
-LEAST_HEIGHT, GREATEST_HEIGHT = 0.008, 0.016  # rad, of all waves together
+LEAST_HEIGHT, GREATEST_HEIGHT = 0.02, 0.05  # rad, of all waves together
 PREVIEWS = (1.0, 2.0, 4.0)  # leg lengths downhill of the walker
-SLOPE_CENTRE, SLOPE_SCALE = 0.01, 0.01  # rad, of the observed slopes
+SLOPE_CENTRE, SLOPE_SCALE = 0.01, 0.02  # rad, of the observed slopes
 
 
 @formula
@@ -40,7 +44,7 @@ def slope_at(task: Any, x: Any) -> Any:
 
 @formula
 def hills_start(walker: Any, task: Any) -> None:
-    """Draw the waves around the body's slope, and a heading."""
+    """Draw the waves around the body's slope, a heading and a speed."""
     task.mean_slope = walker.slope
     height = uniform(walker, LEAST_HEIGHT, GREATEST_HEIGHT)
     shares = 0.0
@@ -51,7 +55,7 @@ def hills_start(walker: Any, task: Any) -> None:
         shares += task.heights[k]
     for k in range(WAVES):
         task.heights[k] *= height / shares
-    new_heading(walker, task)
+    new_heading_and_speed(walker, task)
 
 
 @formula
@@ -63,7 +67,7 @@ def hills_refresh(walker: Any, task: Any) -> None:
 def hills_features(walker: Any, task: Any) -> Any:
     x = place(walker)[0]
     return (
-        *heading_features(walker, task),
+        *speed_features(walker, task),
         walker.slope,
         slope_at(task, x + PREVIEWS[0]),
         slope_at(task, x + PREVIEWS[1]),
@@ -72,10 +76,10 @@ def hills_features(walker: Any, task: Any) -> Any:
 
 
 HILLS = replace(
-    HEADING,
+    SPEED_HEADING,
     name="Hills",
     fields=(
-        *HEADING.fields,
+        *SPEED_HEADING.fields,
         Field("mean_slope", "rad", "around which the slope varies"),
         Field("wave_numbers", "rad / leg length", "of the slope's waves", size=WAVES),
         Field("phases", "rad", "of the same, where the walk starts", size=WAVES),
@@ -85,7 +89,7 @@ HILLS = replace(
     refresh=hills_refresh,
     features=hills_features,
     observed=(
-        *HEADING.observed,
+        *SPEED_HEADING.observed,
         *(
             Feature(
                 f"slope_{ahead:g}",
@@ -97,9 +101,10 @@ HILLS = replace(
             for ahead in (0.0, *PREVIEWS)
         ),
     ),
-    summary=f"Walk where you are told, over hills: a heading within {LARGEST_SLOPE_COMMAND} rad of downhill, where the slope varies along the "
-    f"way by the sum of {WAVES} waves of random length ({SHORTEST_WAVE:g} to {LONGEST_WAVE:g} leg lengths) and {LEAST_HEIGHT} to "
-    f"{GREATEST_HEIGHT} rad together. The masses may be moved as fast as in Level, to pump.",
+    summary=f"Walk where and as fast as you are told, over hills: a heading within {LARGEST_SLOPE_COMMAND} rad of downhill and a speed from "
+    f"{LEAST_SPEED:.2f} to {GREATEST_SPEED:.2f}, commanded anew together every {SHORTEST_COMMAND} to {LONGEST_COMMAND} units of time. The slope "
+    f"varies along the way by the sum of {WAVES} waves of random length ({SHORTEST_WAVE:g} to {LONGEST_WAVE:g} leg lengths) and "
+    f"{LEAST_HEIGHT} to {GREATEST_HEIGHT} rad together, and is seen ahead. The masses may be moved as fast as in Level, to pump.",
     history=NEW,
     parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
     max_offset_change=0.1,

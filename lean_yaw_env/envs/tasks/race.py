@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import tan
 from typing import Any
 
-from lean_yaw_env.envs.formulas import ends_in_time, place
+from lean_yaw_env.envs.formulas import ends_in_time, place, positive
 from lean_yaw_env.envs.state import Field
 from lean_yaw_env.envs.tasks.task import FRICTION_LIMIT, NEW, Feature, Metric, Task
 from lean_yaw_env.envs.tasks.waypoints import (
@@ -24,10 +24,11 @@ _GREATEST_SHIFT = tan(GREATEST_BEARING)  # to the side per leg length downhill
 HALF_WIDTH = 0.5  # leg lengths, of a gate
 SHIFT_SCALE = 4.0
 
-# Reward: per leg length downhill, and for a gate that was missed. Gates are farther apart than a missed one costs, so that walking on is
-# always worth more than a fall.
+# Reward: per leg length downhill, and for a gate that was missed: the whole price if it was missed by so much, less in proportion. Gates are
+# farther apart, on average, than a missed one costs, so that walking on is worth more than a fall.
 PROGRESS = 1.0
-MISS_PRICE = 5.0
+MISS_PRICE = 8.0
+WHOLE_MISS = 2.0  # leg lengths beside the gate
 
 
 @formula
@@ -53,22 +54,24 @@ def is_beyond(walker: Any, task: Any) -> bool:
 
 
 @formula
-def is_missed(walker: Any, task: Any) -> bool:
-    """Whether the walker has just gone beyond the gate's line, but beside the gate."""
+def beside_gate(walker: Any, task: Any) -> Any:
+    """How far the walker is beside the next gate, as it would go through the gate's line here; 0 in front of its opening."""
     aside = place(walker)[1] - task.goal_z
-    return is_beyond(walker, task) and abs(aside.real) > HALF_WIDTH
+    return positive((aside if aside.real > 0.0 else -aside) - HALF_WIDTH)
 
 
 @formula
 def race_reward(walker: Any, task: Any) -> Any:
     earned = PROGRESS * (place(walker)[0] - task.downhill)
-    return earned - MISS_PRICE if is_missed(walker, task) else earned
+    share = beside_gate(walker, task) / WHOLE_MISS
+    price = MISS_PRICE * (share if share.real < 1.0 else 1.0 + 0.0 * share)
+    return earned - price if is_beyond(walker, task) else earned
 
 
 @formula
 def race_update(walker: Any, task: Any) -> bool:
     if is_beyond(walker, task):
-        if is_missed(walker, task):
+        if beside_gate(walker, task) > 0.0:
             task.missed += 1
         else:
             task.passed += 1
@@ -136,9 +139,9 @@ RACE = Task(
         "gates_missed": Metric("missed", None, "gates missed so far", "lower"),
     },
     summary=f"Race downhill through gates: each {NEAREST:g} to {FARTHEST:g} leg lengths downhill of the one before, up to {GREATEST_BEARING} "
-    f"rad to either side of it, and {2 * HALF_WIDTH:g} wide. The way downhill until the horizon counts, and a gate that is missed costs "
-    f"{MISS_PRICE:g} leg lengths of it. The masses may be moved as fast as in Level, to pump. The next two gates are seen.",
-    reward_text=f"{PROGRESS:g} (speed downhill); {MISS_PRICE:g} less for the step that misses a gate",
+    f"rad to either side of it, and {2 * HALF_WIDTH:g} wide. The way downhill until the horizon counts. A gate that is missed by "
+    f"{WHOLE_MISS:g} leg lengths or more costs {MISS_PRICE:g} leg lengths of it, one that is missed by less costs less in proportion. The masses may be moved as fast as in Level, to pump. The next two gates are seen.",
+    reward_text=f"{PROGRESS:g} (speed downhill); less {MISS_PRICE:g} min(1, miss / {WHOLE_MISS:g}) for the step that misses a gate",
     history=NEW,
     goal_fields=("goal_x", "goal_z"),
     goal_radius=HALF_WIDTH,

@@ -1,4 +1,4 @@
-"""Pictures of what the commands find: a gait, a map of gaits, a basin of attraction, a vehicle's eigenvalues."""
+"""Figures of what the analysis finds: a gait, a map of gaits, a basin of attraction, a vehicle's eigenvalues. They need matplotlib."""
 
 from __future__ import annotations
 
@@ -17,9 +17,12 @@ from lean_yaw_env.rendering.palette import (
     GREEN,
     LIGHT_GREY,
     SERIES_COLOURS,
+    STRONG_GRID,
     mixed,
     unit_colour,
 )
+
+__all__ = ["basin_figure", "eigenvalue_figure", "gait_figure", "map_figure", "use_style"]
 
 if TYPE_CHECKING:
     import xarray
@@ -38,6 +41,24 @@ _MOST_PANELS = 6
 
 def _name(name: str) -> str:
     return name.replace("_", " ")
+
+
+def use_style() -> None:
+    """Give pyplot's figures of this program the colours and lines of the package's own."""
+    from cycler import cycler
+    from matplotlib import rcParams
+
+    rcParams.update(
+        {
+            "axes.prop_cycle": cycler(color=_COLOURS),
+            "axes.spines.right": False,
+            "axes.spines.top": False,
+            "figure.constrained_layout.use": True,
+            "figure.figsize": (8.0, 3.6),
+            "grid.color": unit_colour(STRONG_GRID),
+            "legend.frameon": False,
+        }
+    )
 
 
 def gait_figure(cycle: LimitCycle) -> Figure:
@@ -90,7 +111,7 @@ def _draw_multipliers(plane: Axes, cycle: LimitCycle) -> None:
 
 
 def map_figure(data: xarray.Dataset) -> Figure:
-    """A stability map: over one parameter |λ| and the speed, over two a plane, over three planes at some values of the first."""
+    """A stability map: over one parameter the magnitudes of the multipliers and the speed, over two a plane, over three planes at some values of the first."""
     names = [str(name) for name in data["spectral_radius"].dims]
     if len(names) == 1:
         return _line_map(data, names[0])
