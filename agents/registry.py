@@ -34,6 +34,7 @@ from .policies.policy_files import (
     shipped_seeds,
     task_of,
 )
+from .settings import all_settings
 
 Kind = Literal["baseline", "feedback", "planner", "learned"]
 """How an agent chooses: blindly, by feedback from its observation, by a search on the walker itself at every step, or as it was trained."""

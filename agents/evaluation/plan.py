@@ -245,7 +245,7 @@ def _outcomes(
         for chunk in waiting:
             yield chunk, _run_chunk(chunk, cache)
         return
-    with _pool(min(processes, len(waiting))) as pool:
+    with worker_pool(min(processes, len(waiting))) as pool:
         with uninterrupted():
             futures = {pool.submit(_run_chunk, chunk, cache): chunk for chunk in waiting}
         for future in as_completed(futures):
@@ -253,7 +253,7 @@ def _outcomes(
 
 
 @contextlib.contextmanager
-def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+def worker_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     """Processes of one thread each; at an interruption what has begun ends and is kept, and nothing else begins."""
     before = dict(os.environ)
     os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
