@@ -31,6 +31,7 @@ from lean_yaw_env.analysis.limit_cycle import (
 from lean_yaw_env.analysis.passive_map import PassiveMap
 from lean_yaw_env.analysis.section_map import BODY_PARAMETERS, SectionMap, section_map_of
 from lean_yaw_env.analysis.storage import load_dataset, save_dataset
+from lean_yaw_env.engine import Engine
 
 __all__ = [
     "BODY_PARAMETERS",
@@ -42,6 +43,7 @@ __all__ = [
     "ClosedLoopMap",
     "ControlInterface",
     "Disturbance",
+    "Engine",
     "Event",
     "FloorDemand",
     "LargestPushes",
