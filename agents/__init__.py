@@ -1,6 +1,6 @@
 """Agents for the walking environments: controllers, predictive control, and trained policies.
 
-``load("LeanYaw/Heading-v0")`` gives a trained policy that comes with the package, ``load(folder)`` one of your own; policies need
+``load("LeanYaw/Heading-v1")`` gives a trained policy that comes with the package, ``load(folder)`` one of your own; policies need
 ``lean-yaw-env[agents]``, training ``lean-yaw-env[train]``, the controllers nothing more than the walker itself. In a checkout the package is
 ``agents``, in an installation ``lean_yaw_env.agents``.
 """

@@ -56,11 +56,11 @@ def main() -> None:
 
 @_command("train")
 def train(
-    task: Annotated[str, Option(help="The task's name, as in LeanYaw/<task>-v0.")] = "Heading",
+    task: Annotated[str, Option(help="The task's name, as in LeanYaw/<task>-v1.")] = "Heading",
     seed: Annotated[int | None, Option(help="Random seed; 0 by default.")] = None,
     seeds: Annotated[str | None, Option(help="Several seeds instead of one, a run for each: 0-4, or 5 for the same, or 0,3,7.")] = None,
     jobs: Annotated[int, Option(min=1, help="Number of processes for several seeds.")] = 1,
-    algorithm: Annotated[str | None, Option(help="ppo, sac, apg or, for WaypointGoal, her; ppo otherwise.")] = None,
+    algorithm: Annotated[str | None, Option(help="ppo, frames, recurrent, sac, tqc, apg, for UnknownBody oracle or for WaypointGoal her; ppo otherwise.")] = None,
     steps: Annotated[int | None, Option(help="Walking steps to train for, over all walkers; the task's own number otherwise.")] = None,
     episodes: Annotated[int | None, Option(help="Evaluation episodes of each agent; 1000 by default.")] = None,
     out: Annotated[Path, Option(help="Where runs leave their folders.")] = Path("runs"),
@@ -86,7 +86,7 @@ def train(
     }  # fmt: skip
     chosen = {name: value for name, value in given.items() if value is not None}
     place = _training_place(task, seeds, out, folder, chosen, resume)
-    again = f"python -m {__package__} train --resume --run {place}"
+    again = shlex.join(["python", "-m", str(__package__), "train", "--resume", "--run", str(place)])
     typer.echo(f"training in {place}; after an interruption, continue with: {again}")
     keep(f"continue with: {again}")
     console = Console()
@@ -122,6 +122,33 @@ def _training_place(
     if "seed" in chosen:
         raise ValueError("seeds must not be given together with --seed")
     return new_series(task, parse_seeds(seeds), out, chosen)
+
+
+@_command("retrain")
+def retrain(
+    task: Annotated[list[str] | None, Option("--task", help="Tasks, separated by commas; all by default.")] = None,
+    algorithm: Annotated[list[str] | None, Option("--algorithm", help="Algorithms, separated by commas; all by default.")] = None,
+    jobs: Annotated[int, Option(min=1, help="Number of processes.")] = os.cpu_count() or 1,
+    steps: Annotated[int | None, Option(help="Walking steps of each training; the task's own number otherwise.")] = None,
+    episodes: Annotated[int | None, Option(help="Validation episodes of each agent; 1000 by default.")] = None,
+    out: Annotated[Path, Option(help="Folder for the trainings. Those begun there already go on.")] = Path("runs/retrained"),
+    shipped: Annotated[bool, Option("--ship", help="Put the new agents in the place of those of the package, and remove those of tasks that there are no more.")] = False,
+) -> None:  # fmt: skip
+    """Train all agents that come with the package anew: each algorithm on its tasks, with all seeds. The same command continues an interrupted training."""
+    from lean_yaw_env.registration import ALL_TASKS
+
+    from . import shipping
+    from .learning.algorithms import ALGORITHMS
+
+    names = names_in(task or [ALL])
+    tasks = ALL_TASKS if ALL in names else tasks_in(names)
+    given = {"steps": steps, "episodes": episodes}
+    choices = {name: value for name, value in given.items() if value is not None}
+    keep(f"finished trainings are in {out}; {AGAIN}")
+    for folder in shipping.retrain(
+        tasks, names_in(algorithm or ALGORITHMS), out, jobs=jobs, shipped=shipped, choices=choices
+    ):
+        typer.echo(f"finished: {folder}")
 
 
 @_command("tune")
@@ -357,7 +384,7 @@ def capture(
     from .evaluation.capture import examine_captures, show, write_captures
 
     reports, notes = examine_captures(
-        tasks_in(task or ["Push"]), names_in([agents]), path=agent_path, runs=runs,
+        tasks_in(task or ["Metastable"]), names_in([agents]), path=agent_path, runs=runs,
         starts=starts, points=points, friction_limits=friction_limit or [float("inf")],
     )  # fmt: skip
     if as_json:

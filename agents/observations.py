@@ -17,6 +17,7 @@ from lean_yaw_env.envs.observation import (
     STANCE_FOOT,
 )
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.envs.state import BODY_NAMES
 from lean_yaw_env.envs.tasks import task_named
 
 _CENTRES = dict(zip(COMMON_NAMES, COMMON_CENTRES, strict=True))
@@ -48,8 +49,11 @@ class ObservationLayout:
                 raise ValueError(
                     f"task must be one that shows {name}, got {task!r}, which shows {', '.join(names)}"
                 )
-        centres = _CENTRES | {feature.name: feature.centre for feature in made.observed}
-        scales = _SCALES | {feature.name: feature.scale for feature in made.observed}
+        body = zip(BODY_NAMES, made.body_reach, strict=True)
+        parameters = options.walker_parameters(made)
+        centres = _CENTRES | {name: getattr(parameters, name) for name in BODY_NAMES}
+        centres |= {feature.name: feature.centre for feature in made.observed}
+        scales = _SCALES | dict(body) | {feature.name: feature.scale for feature in made.observed}
         return cls(
             names,
             tuple(centres[name] for name in names),

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.errors import NoGaitError
@@ -65,11 +65,19 @@ class AgentRequest:
 
 @dataclass(frozen=True)
 class AgentEntry:
-    """An agent of the registry: its kind, what makes it for a request, and the names of the tasks that it is for."""
+    """An agent of the registry: its kind, what makes it for a request, the names of the tasks that it is for, and options that it needs.
+
+    These options hold in the place of the environment's: an oracle walks in an environment that shows what others must find out.
+    """
 
     kind: Kind
     make: Callable[[AgentRequest], Agent]
     tasks: tuple[str, ...] = ALL_TASKS
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def needed_options(self, options: EnvOptions) -> EnvOptions:
+        """Options of the environment with those that the agent needs."""
+        return replace(options, **self.options)
 
 
 def _layout(request: AgentRequest) -> ObservationLayout:
@@ -101,15 +109,22 @@ def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
     return made
 
 
+_STEERED = ("Heading", "SpeedHeading", "UTurn", "Level", "Energy", "UnknownBody", "Hills")
+"""Tasks that command a heading."""
+
 AGENTS: dict[str, AgentEntry] = {
     "random": AgentEntry("baseline", lambda asked: RandomController(asked.seed, _layout(asked))),
     "fixed": AgentEntry("baseline", lambda asked: FixedController(_layout(asked))),
-    "feedback": AgentEntry("feedback", _feedback, ("Heading", "SpeedHeading", "UTurn", "Level")),
+    "feedback": AgentEntry("feedback", _feedback, _STEERED),
     "lqr": AgentEntry("feedback", _lqr),
     "mpc": AgentEntry("planner", _mpc, tuple(TASK_VERSIONS)),
     "ppo": AgentEntry("learned", _trained("ppo")),
     "sac": AgentEntry("learned", _trained("sac")),
     "apg": AgentEntry("learned", _trained("apg")),
+    "tqc": AgentEntry("learned", _trained("tqc")),
+    "frames": AgentEntry("learned", _trained("frames")),
+    "recurrent": AgentEntry("learned", _trained("recurrent")),
+    "oracle": AgentEntry("learned", _trained("oracle"), ("UnknownBody",), {"show_body": True}),
     "her": AgentEntry("learned", _trained("her"), (GOAL_TASK,)),
 }
 """Every agent, in the order of tables; a learned one has the name of its algorithm."""
@@ -190,7 +205,8 @@ def env_id_of(task: str) -> str:
 def newest_policy(env_id: str, runs: Path, algorithm: str = DEFAULT_ALGORITHM) -> Path | None:
     """The folder of an algorithm's policy for an environment that was written last under ``runs``, if there is any."""
     found: list[tuple[float, Path]] = []
-    for card in runs.rglob(CARD_FILE):
+    # a run's folder, or that of one seed of a series; what else is below, as evaluations, is not searched
+    for card in (*runs.glob(f"*/{CARD_FILE}"), *runs.glob(f"*/seed*/{CARD_FILE}")):
         try:
             values = read_json(card)
         except ValueError:

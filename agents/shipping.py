@@ -2,14 +2,30 @@
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.files import read_json, write_json
+from lean_yaw_env.files import locked, read_json, write_json
+from lean_yaw_env.registration import ALL_ENV_IDS, NAMESPACE
+from lean_yaw_env.validation import require_choice
 
-from .learning.runs import EVALUATION_FILE
-from .learning.series import is_series, runs_of
+from .learning.algorithms import ALGORITHMS
+from .learning.runs import EVALUATION_FILE, Training, is_finished, read_run
+from .learning.series import (
+    finish_series,
+    is_series,
+    make_series,
+    run_side_by_side,
+    runs_of,
+    trainings_of,
+)
+from .policies import policy_files
 from .policies.policy_files import load, save, shipping_folder
+from .registry import agent_entry
 from .settings import all_settings, keep_settings, with_values
 from .tuning.spaces import space_of
 
@@ -34,6 +50,83 @@ def ship(source: Path, *, replace: bool = False) -> list[Path]:
     return [_ship_policy(run, replace) for run in runs]
 
 
+def retrain(
+    tasks: Collection[str],
+    algorithms: Collection[str],
+    out: Path,
+    *,
+    jobs: int = 1,
+    shipped: bool = False,
+    choices: Mapping[str, Any] | None = None,
+    progress: bool = True,
+) -> Iterator[Path]:
+    """Train the agents that come with the package anew, as ``ALGORITHMS`` lists them; yield the folder of each series that is finished.
+
+    Parameters
+    ----------
+    tasks, algorithms : those wanted
+    out : folder for the series, each named ``<Task>-<algorithm>``; those begun there already go on
+    jobs : number of processes
+    shipped : put each finished series in the place of the package's agents of its task and algorithm
+    choices : arguments of ``Training.of_task`` in place of the package's own
+
+    Raises
+    ------
+    ValueError
+        If a choice is bad, or ``out`` holds trainings with other settings.
+    RunError
+        If a run fails, after the others.
+    """
+    planned: dict[Path, list[Training]] = {}
+    for name in algorithms:
+        entry = ALGORITHMS[require_choice("algorithm", name, ALGORITHMS)]
+        for task in [each for each in entry.shipped if each in tasks]:
+            wanted = {**(choices or {}), "algorithm": name}
+            planned[out / f"{task}-{name}"] = trainings_of(task, range(entry.seeds), wanted)
+    out.mkdir(parents=True, exist_ok=True)
+    with locked(out):
+        for folder, trainings in planned.items():
+            _begin(folder, trainings)
+        runs = [run for folder in planned for run in runs_of(folder).values()]
+        unfinished, waiting = [run for run in runs if not is_finished(run)], list(planned)
+        for _ in chain((None,), run_side_by_side(unfinished, jobs, progress=progress)):
+            for folder in waiting[:]:
+                if all(map(is_finished, runs_of(folder).values())):
+                    waiting.remove(folder)
+                    finish_series(folder)
+                    if shipped:
+                        _ship_in_place(folder)
+                    yield folder
+    if shipped:
+        _remove_unknown()
+
+
+def _begin(folder: Path, trainings: Sequence[Training]) -> None:
+    """Make a series' folder, or check that the one there is of these trainings."""
+    if not is_series(folder):
+        shutil.rmtree(folder, ignore_errors=True)  # of a process that was ended in the midst
+        make_series(trainings, folder)
+    elif [read_run(run) for run in runs_of(folder).values()] != trainings:
+        raise ValueError(
+            f"{str(folder)!r} holds trainings with other settings; remove it or name another folder"
+        )
+
+
+def _ship_in_place(folder: Path) -> None:
+    """Ship a series, and remove what else the package has of its task and algorithm."""
+    places = ship(folder, replace=True)
+    for other in places[0].parent.iterdir():
+        if other not in places:
+            shutil.rmtree(other)
+
+
+def _remove_unknown() -> None:
+    """Remove the package's agents for environments that there are no more."""
+    for folder in policy_files.SHIPPED.iterdir():
+        if f"{NAMESPACE}/{folder.name}" not in ALL_ENV_IDS:
+            shutil.rmtree(folder)
+
+
 def _ship_policy(run: Path, replace: bool) -> Path:
     """Copy a finished run's policy and its evaluation to where ``load`` finds the package's agents."""
     card = (policy := load(run)).card
@@ -41,7 +134,7 @@ def _ship_policy(run: Path, replace: bool) -> Path:
     if not evaluation.exists():
         raise ValueError(f"the run in {str(run)!r} is not finished")
     rows = [row for row in read_json(evaluation) if row["agent"] == card.algorithm]
-    if card.options != EnvOptions():
+    if card.options != agent_entry(card.algorithm).needed_options(EnvOptions()):
         raise ValueError(
             f"options of {str(run)!r} must be the environment's own, got {card.options}"
         )

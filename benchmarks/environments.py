@@ -19,7 +19,7 @@ from lean_yaw_env.envs.dynamics import OUTCOME_SIZE
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.kernel.batch import step_batch
 
-HEADING = "LeanYaw/Heading-v0"
+HEADING = "LeanYaw/Heading-v1"
 STEPS = 200  # of a single environment in a round
 SIZES = (1024, 16384)
 SMALLEST_SIZES = (8,)

@@ -19,7 +19,7 @@ with warnings.catch_warnings(record=True) as caught:
     warnings.simplefilter("always")
     import gymnasium as gym
     import lean_yaw_env
-    env = gym.make("LeanYaw/Heading-v0")
+    env = gym.make("LeanYaw/Heading-v1")
     env.reset(seed=0)
     env.step(env.action_space.sample())
 print(time.process_time(), sum("compiled" in str(each.message) for each in caught))

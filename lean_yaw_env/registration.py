@@ -9,34 +9,22 @@ from lean_yaw_env.validation import require_finite
 
 NAMESPACE = "LeanYaw"
 
-TASK_VERSIONS = {
-    "Heading": 0,
-    "Walk": 0,
-    "SpeedHeading": 0,
-    "Waypoint": 0,
-    "Slalom": 0,
-    "Push": 0,
-    "UTurn": 0,
-    "Level": 0,
-}
+SUITE_VERSION = 1
+_TASKS = (
+    "Heading", "Walk", "SpeedHeading", "Waypoint", "Slalom", "Metastable", "UTurn", "Level",
+    "LevelUphill", "Energy", "UnknownBody", "Race", "Hills",
+)  # fmt: skip
+TASK_VERSIONS = dict.fromkeys(_TASKS, SUITE_VERSION)
 """Every task's name and version; ``envs.tasks`` defines the tasks."""
 
-REWARD_THRESHOLDS = {
-    "Heading": 184.0,
-    "Walk": 200.0,
-    "SpeedHeading": 164.0,
-    "Slalom": 164.0,
-    "UTurn": 151.0,
-    "Level": 179.0,
-}
-"""The mean return from which a task counts as solved: what the best feedback controller earns on held-out episodes (docs/leaderboard.md).
-Other tasks are measured otherwise."""
+REWARD_THRESHOLDS: dict[str, float] = {}
+"""The mean return from which a task counts as solved, for tasks that are measured by the return."""
 
 ENV_IDS = tuple(f"{NAMESPACE}/{name}-v{version}" for name, version in TASK_VERSIONS.items())
 
 GOAL_TASK = "WaypointGoal"
 """Waypoint with one goal, rewarded for reaching it alone."""
-GOAL_ENV_ID = f"{NAMESPACE}/{GOAL_TASK}-v0"
+GOAL_ENV_ID = f"{NAMESPACE}/{GOAL_TASK}-v{SUITE_VERSION}"
 """That task for goal-conditioned learners: the one environment whose observations are dictionaries."""
 
 ALL_TASKS = (*TASK_VERSIONS, GOAL_TASK)

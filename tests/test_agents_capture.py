@@ -26,7 +26,7 @@ from lean_yaw_env.envs.options import EnvOptions
 STARTS, POINTS = 60, 7
 
 
-def report_of(name: str, task: str = "Push", **settings: float) -> CaptureReport:
+def report_of(name: str, task: str = "Metastable", **settings: float) -> CaptureReport:
     agent = make_agent(name, AgentRequest(env_id_of(task), EnvOptions()))
     return examine_capture(name, agent, task, starts=STARTS, points=POINTS, **settings)  # pyright: ignore[reportArgumentType]
 
@@ -55,14 +55,14 @@ def test_agents_of_a_task_are_held_against_the_same_sets(reports) -> None:
 
 
 def test_what_an_agent_saves_is_what_it_walks_on_from(reports) -> None:
-    agent = make_agent("ppo", AgentRequest(env_id_of("Push"), EnvOptions()))
-    loop = closed_loop(agent, "Push")
+    agent = make_agent("ppo", AgentRequest(env_id_of("Metastable"), EnvOptions()))
+    loop = closed_loop(agent, "Metastable")
     walks = walk_many(loop, box_starts(loop, STARTS), MOST_STEPS + SETTLE_STEPS)
     assert np.array_equal(walks.survived, reports[1].is_saved)
 
 
 def test_the_offset_changes_by_no_more_than_the_task_lets_an_agent_change_it() -> None:
-    # Heading allows 0.005 a step, Push 0.1; their walkers and starts are the same but for that
+    # Heading allows 0.005 a step, Metastable 0.1; their walkers and starts are the same but for that
     assert report_of("fixed", "Heading").can_be_saved(2) < report_of("fixed").can_be_saved(2)
 
 
@@ -82,10 +82,12 @@ def test_numbers_and_pictures_are_written(tmp_path, reports) -> None:
 
 
 def test_the_command_prints_a_table_and_leaves_out_what_cannot_be_examined() -> None:
-    arguments = ["capture", "--task", "Push,Level", "--agents", "fixed,mpc", "--starts", "8", "--points", "3"]  # fmt: skip
+    arguments = ["capture", "--task", "Metastable,Level", "--agents", "fixed,mpc", "--starts", "8", "--points", "3"]  # fmt: skip
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
-    assert "left out: Push: mpc: agent must answer from its observation alone" in result.output
+    assert (
+        "left out: Metastable: mpc: agent must answer from its observation alone" in result.output
+    )
     assert "Level" in result.output
-    alone = CliRunner().invoke(app, [*arguments[:2], "Push", "--agents", "mpc"])
+    alone = CliRunner().invoke(app, [*arguments[:2], "Metastable", "--agents", "mpc"])
     assert alone.exit_code != 0

@@ -121,7 +121,9 @@ def test_results_are_those_kept(task, agent):
             assert now["about"][nearest] == about
 
 
-@pytest.mark.parametrize(("task", "slope"), [("Heading", 0.01), ("Push", 0.01), ("Walk", 0.02)])
+@pytest.mark.parametrize(
+    ("task", "slope"), [("Heading", 0.01), ("Metastable", 0.01), ("Walk", 0.02)]
+)
 def test_the_walker_that_is_not_acted_on_keeps_the_eigenvalues_of_its_own_gait(task, slope):
     gait = find_limit_cycle(closed_loop(FixedController(), task, EnvOptions(slope=slope)))
     cycle = find_limit_cycle(Walker(WalkerParameters(slope=slope)))

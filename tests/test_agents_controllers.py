@@ -23,7 +23,7 @@ from agents.observations import ObservationLayout
 from lean_yaw_env.envs.options import EnvOptions, gait_of
 from lean_yaw_env.parameters import MIRROR, WalkerParameters
 
-ID = "LeanYaw/Heading-v0"
+ID = "LeanYaw/Heading-v1"
 LAYOUT = ObservationLayout.of("Heading", EnvOptions())
 RAW = EnvOptions(mirror=False)
 RAW_LAYOUT = ObservationLayout.of("Heading", RAW)

@@ -27,7 +27,7 @@ from lean_yaw_env.files import read_json
 
 PAGE = Path(__file__).parents[1] / "docs" / "enter_your_agent.md"
 RECORD = {
-    "format": "lean-yaw-agent", "format_version": 1, "name": "still", "tasks": ["Walk", "Push"],
+    "format": "lean-yaw-agent", "format_version": 1, "name": "still", "tasks": ["Walk", "Metastable"],
     "trainings": ["one", "two"],
 }  # fmt: skip
 LOADER = """
@@ -151,11 +151,11 @@ def test_a_loader_without_load_is_refused(folder: Path):
 
 def test_a_results_file_holds_every_episode_bit_for_bit(folder: Path, tmp_path: Path):
     evaluation = Evaluation(episodes=3, path=folder, progress=False)
-    (found,) = evaluation.run(evaluation.candidates(["Push"], ["fixed"])[1:])
+    (found,) = evaluation.run(evaluation.candidates(["Metastable"], ["fixed"])[1:])
     path = write_results(found, tmp_path, "validation", 0)
-    assert path.name == "Push-still.json"
+    assert path.name == "Metastable-still.json"
     again = read_results(path, "validation", 0)
-    assert (again.task, again.agent, len(again.runs)) == ("Push", "still", 2)
+    assert (again.task, again.agent, len(again.runs)) == ("Metastable", "still", 2)
     for metric in found.metrics:
         assert np.array_equal(again.values(metric), found.values(metric), equal_nan=True)
 

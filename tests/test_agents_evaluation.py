@@ -118,13 +118,13 @@ def test_the_command_line_takes_agents_one_after_the_other():
 
 
 def test_tasks_and_agents_may_be_repeated_or_separated_by_commas():
-    arguments = ["evaluate", "--task", "Walk,Push", "--task", "Walk", "--agents", "random,fixed", "--agents", "fixed"]  # fmt: skip
+    arguments = ["evaluate", "--task", "Walk,Metastable", "--task", "Walk", "--agents", "random,fixed", "--agents", "fixed"]  # fmt: skip
     short = ["--episodes", "2", "--processes", "1", "--json"]
     result = CliRunner().invoke(app, [*arguments, *short])
     assert result.exit_code == 0, result.output
     rows = json.loads(result.stdout)
     assert list(dict.fromkeys((row["task"], row["agent"]) for row in rows)) == [
-        ("Walk", "random"), ("Walk", "fixed"), ("Push", "random"), ("Push", "fixed"),
+        ("Walk", "random"), ("Walk", "fixed"), ("Metastable", "random"), ("Metastable", "fixed"),
     ]  # fmt: skip
 
 

@@ -33,7 +33,7 @@ from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.registration import TASK_VERSIONS
 
 VALIDATION = first_seed("validation")
-ID = "LeanYaw/Heading-v0"
+ID = "LeanYaw/Heading-v1"
 TINY = GradientSettings(
     steps=1280,
     walkers=8,
@@ -102,7 +102,7 @@ def walked_total(task, actions, options):
     return rewards, (observations**2).sum(), fell
 
 
-OPTIONS = [("Heading", EnvOptions(random_body="training")), ("SpeedHeading", EnvOptions(sensor_noise=0.1, hidden_rates=True))]  # fmt: skip
+OPTIONS = [("Heading", EnvOptions(random_body="training")), ("SpeedHeading", EnvOptions(sensor_noise=0.1, hidden_rates=True)), ("Level", EnvOptions(horizon=0.4))]  # fmt: skip
 
 
 @pytest.mark.parametrize(("task", "options"), [*((task, EnvOptions()) for task in TASK_VERSIONS), *OPTIONS])  # fmt: skip

@@ -139,4 +139,4 @@ def test_agents_of_the_task_act_on_dictionaries_too(name: str) -> None:
 
 
 def test_the_package_s_agent_of_the_goal_environment_is_loaded_by_its_id_alone():
-    assert agents.load("LeanYaw/WaypointGoal-v0").card.algorithm == "her"
+    assert agents.load("LeanYaw/WaypointGoal-v1").card.algorithm == "her"

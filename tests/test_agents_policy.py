@@ -25,7 +25,7 @@ from agents.policies.policy import Policy, PolicyCard
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.parameters import WalkerParameters
 
-ID = "LeanYaw/Heading-v0"
+ID = "LeanYaw/Heading-v1"
 FEATURES = 7
 
 
@@ -143,9 +143,9 @@ def test_a_policy_file_that_holds_pickled_code_is_refused_and_not_run(folder, tm
 def test_another_environment_or_version_is_refused_with_what_to_do(folder):
     with pytest.raises(
         agents.PolicyFileError,
-        match="trained for the env_id 'LeanYaw/Heading-v0', not for 'LeanYaw/Walk-v0'",
+        match="trained for the env_id 'LeanYaw/Heading-v1', not for 'LeanYaw/Walk-v1'",
     ):
-        agents.load(folder, env_id="LeanYaw/Walk-v0")
+        agents.load(folder, env_id="LeanYaw/Walk-v1")
     change(folder, env_id="LeanYaw/Heading-v99")
     with pytest.raises(agents.PolicyFileError, match=r"environment is LeanYaw/Heading-v\d+, not LeanYaw/Heading-v99.*train a policy anew"):  # fmt: skip
         agents.load(folder)
@@ -251,18 +251,18 @@ def test_agents_of_the_package_are_found_by_id_algorithm_and_seed(tmp_path, monk
     for algorithm, seed in [("ppo", 3), ("ppo", 11), ("sac", 2)]:
         folder = policy_files.shipping_folder(ID, algorithm, seed)
         agents.save(Policy(card(algorithm=algorithm, seed=seed), weights(seed)), folder)
-    assert (tmp_path / "Heading-v0" / "sac" / "seed2" / policy_files.CARD_FILE).exists()
+    assert (tmp_path / "Heading-v1" / "sac" / "seed2" / policy_files.CARD_FILE).exists()
     assert agents.shipped_seeds(ID, "ppo") == [3, 11]
     assert agents.shipped_seeds(ID, "sac") == [2]
-    assert agents.shipped_seeds("LeanYaw/Walk-v0", "ppo") == []
+    assert agents.shipped_seeds("LeanYaw/Walk-v1", "ppo") == []
     assert agents.load(ID).card.seed == 3
     assert agents.load(ID, seed=11).card.seed == 11
     assert agents.load(ID, algorithm="sac").card.algorithm == "sac"
     for id_, choices, message in [
-        (ID, {"seed": 5}, "no agent of the algorithm 'ppo' for LeanYaw/Heading-v0 with seed 5"),
-        (ID, {"algorithm": "sac", "seed": 3}, "'sac' for LeanYaw/Heading-v0 with seed 3"),
+        (ID, {"seed": 5}, "no agent of the algorithm 'ppo' for LeanYaw/Heading-v1 with seed 5"),
+        (ID, {"algorithm": "sac", "seed": 3}, "'sac' for LeanYaw/Heading-v1 with seed 3"),
         (ID, {"algorithm": "../ppo"}, "algorithm must be a lower-case word"),
-        ("LeanYaw/Walk-v0", {}, "no agent of the algorithm 'ppo' for LeanYaw/Walk-v0"),
+        ("LeanYaw/Walk-v1", {}, "no agent of the algorithm 'ppo' for LeanYaw/Walk-v1"),
         ("LeanYaw/Heading-v7", {}, "not LeanYaw/Heading-v7"),
     ]:
         with pytest.raises(agents.PolicyFileError, match=message):
@@ -326,10 +326,10 @@ from agents import AgentRequest, FixedController, load, make_agent
 from agents.evaluation.scoring import run_episodes
 from lean_yaw_env.envs.options import EnvOptions
 short = EnvOptions(horizon=3.0)
-for agent in (FixedController(), make_agent("lqr", AgentRequest("LeanYaw/Walk-v0", short))):
+for agent in (FixedController(), make_agent("lqr", AgentRequest("LeanYaw/Walk-v1", short))):
     print(run_episodes(agent, "Walk", episodes=1, options=short).survived)
 try:
-    load("LeanYaw/Walk-v0")
+    load("LeanYaw/Walk-v1")
 except ImportError as error:
     print(error)
 """

@@ -35,10 +35,10 @@ def test_every_variation_but_the_first_changes_one_option_of_every_task(task: st
 def test_an_agent_is_made_for_the_task_as_it_is_and_a_planner_for_what_it_plans_on():
     steeper = varied(Candidate("Heading", "lqr", 3, SHORT), "steeper")
     (found,) = Evaluation(progress=False).run([steeper])
-    unaware = make_agent("lqr", AgentRequest("LeanYaw/Heading-v0", SHORT))
+    unaware = make_agent("lqr", AgentRequest("LeanYaw/Heading-v1", SHORT))
     own = run_episodes(unaware, "Heading", episodes=3, options=steeper.options)
     assert np.array_equal(found.values(RETURN)[0], own.metrics[RETURN])
-    aware = make_agent("lqr", AgentRequest("LeanYaw/Heading-v0", steeper.options))
+    aware = make_agent("lqr", AgentRequest("LeanYaw/Heading-v1", steeper.options))
     other = run_episodes(aware, "Heading", episodes=3, options=steeper.options)
     assert not np.array_equal(other.metrics[RETURN], own.metrics[RETURN])
     assert varied(Candidate("Heading", "mpc", 1, SHORT), "steeper").made_for is None

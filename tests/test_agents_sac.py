@@ -19,7 +19,7 @@ from agents.learning.sac import SACSettings
 from agents.settings import with_values
 from lean_yaw_env.envs.options import EnvOptions
 
-ID = "LeanYaw/Heading-v0"
+ID = "LeanYaw/Heading-v1"
 TINY = SACSettings(
     steps=640, walkers=8, gradient_steps=1, batch_size=32, buffer_size=400, random_steps=64, hidden=(8, 6)
 )  # fmt: skip

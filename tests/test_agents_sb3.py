@@ -172,7 +172,7 @@ def test_stepping_without_actions_is_refused():
 
 
 def test_it_draws_a_grid_of_walkers() -> None:
-    env = WalkerVecEnv(4, "LeanYaw/Heading-v0", render_mode="rgb_array")
+    env = WalkerVecEnv(4, "LeanYaw/Heading-v1", render_mode="rgb_array")
     env.seed(1)
     env.reset()
     env.step(np.zeros((4, 2), np.float32))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,13 @@ from typer.testing import CliRunner
 import train
 from agents.evaluation.episodes import Episodes, Results, metric_row
 from agents.learning import curves, series
+from agents.learning.algorithms import ALGORITHMS
 from agents.learning.curves import running_means
 from agents.learning.recorder import TrainingLog
 from agents.learning.runs import Training, is_finished, new_run, read_log
 from agents.learning.series import (
     RunError,
+    make_series,
     new_series,
     parse_seeds,
     resumed,
@@ -27,10 +30,11 @@ from agents.learning.series import (
     run_side_by_side,
     runs_of,
     seeds_table,
+    trainings_of,
 )
 from agents.policies import policy_files
 from agents.registry import agent_colour, newest_policy
-from agents.shipping import ship
+from agents.shipping import retrain, ship
 
 # the least that PPO's own settings for the task allow: one update
 TINY = {"steps": 4096, "episodes": 2, "checkpoint_seconds": 0.0}
@@ -134,10 +138,10 @@ def test_a_series_goes_on_with_what_is_unfinished_and_gathers_its_seeds(tmp_path
     with (folder / "seeds.csv").open() as file:
         assert next(csv.reader(file)) == ["metric", "median", "lowest", "highest", "seed0", "seed3"]
     assert (folder / "learning_curves.png").stat().st_size > 0
-    assert newest_policy("LeanYaw/Walk-v0", tmp_path) == runs[3]
+    assert newest_policy("LeanYaw/Walk-v1", tmp_path) == runs[3]
     monkeypatch.setattr(policy_files, "SHIPPED", tmp_path / "trained")
     ship(folder)
-    assert policy_files.shipped_seeds("LeanYaw/Walk-v0") == [0, 3]
+    assert policy_files.shipped_seeds("LeanYaw/Walk-v1") == [0, 3]
 
 
 def test_the_newest_of_runs_and_series_is_gone_on_with(tmp_path):
@@ -159,14 +163,14 @@ def test_runs_side_by_side_finish_and_one_that_fails_is_named(tmp_path):
     runs = list(runs_of(folder).values())
     (runs[1] / "checkpoint.safetensors").write_bytes(b"nothing of the kind")
     with pytest.raises(RunError, match="seed1"):
-        run_side_by_side(runs[1:], 2, progress=False)
+        list(run_side_by_side(runs[1:], 2, progress=False))
     (runs[1] / "checkpoint.safetensors").unlink()
     (runs[0] / "run.json").rename(runs[0] / "kept.json")
     with pytest.raises(RunError, match="seed0"):
-        run_side_by_side(runs, 2, progress=False)
+        list(run_side_by_side(runs, 2, progress=False))
     assert is_finished(runs[1])  # the other run went on
     (runs[0] / "kept.json").rename(runs[0] / "run.json")
-    run_side_by_side(runs, 2, progress=False)
+    assert set(run_side_by_side(runs, 2, progress=False)) == set(runs)
     assert all(is_finished(place) for place in runs)
     assert all(read_log(place).seconds > 0.0 for place in runs)
 
@@ -231,3 +235,37 @@ def test_the_command_line_trains_several_seeds(tmp_path):
     again = CliRunner().invoke(train.app, ["--resume", "--run", str(folder), "--task", "Walk"], env={"COLUMNS": "400"})  # fmt: skip
     assert again.exit_code == 2
     assert "is finished" in again.output
+
+
+def test_agents_of_the_package_are_trained_anew_by_one_command_that_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setattr(policy_files, "SHIPPED", tmp_path / "trained")
+    entry = replace(ALGORITHMS["ppo"], shipped=("Walk", "Heading"), seeds=2)
+    monkeypatch.setitem(ALGORITHMS, "ppo", entry)
+    for old in ("Walk-v99/ppo/seed0", "Walk-v0/ppo/seed7"):  # another version's, and one too many
+        (tmp_path / "trained" / old).mkdir(parents=True)
+    out, choices = tmp_path / "a folder", {"steps": 4096, "episodes": 2}
+    arguments = {"jobs": 2, "shipped": True, "choices": choices, "progress": False}
+    (damaged,) = make_damaged(out / "Walk-ppo", choices)
+    with pytest.raises(RunError, match="seed1"):
+        list(retrain(["Walk"], ["ppo"], out, **arguments))
+    damaged.unlink()
+    first = out / "Walk-ppo" / "seed0" / "policy.safetensors"
+    before = first.stat().st_mtime_ns
+    assert list(retrain(["Walk"], ["ppo"], out, **arguments)) == [out / "Walk-ppo"]
+    assert first.stat().st_mtime_ns == before  # not trained again
+    shipped = sorted(path.parent for path in (tmp_path / "trained").glob("*/*/*/policy.json"))
+    assert shipped == [tmp_path / "trained" / "Walk-v0" / "ppo" / f"seed{k}" for k in (0, 1)]
+    assert [path.name for path in (tmp_path / "trained").iterdir()] == ["Walk-v0"]
+    assert list((tmp_path / "trained" / "Walk-v0" / "ppo").iterdir()) != []
+    rows = [json.loads((place / "evaluation.json").read_text()) for place in shipped]
+    assert all({row["agent"] for row in each} == {"ppo"} for each in rows)
+    with pytest.raises(ValueError, match="trainings with other settings"):
+        list(retrain(["Walk"], ["ppo"], out, choices={"steps": 8192}))
+
+
+def make_damaged(folder: Path, choices: dict) -> list[Path]:
+    """A series of two Walk trainings whose second has a damaged checkpoint; the checkpoint."""
+    make_series(trainings_of("Walk", range(2), {**choices, "algorithm": "ppo"}), folder)
+    checkpoint = folder / "seed1" / "checkpoint.safetensors"
+    checkpoint.write_bytes(b"nothing of the kind")
+    return [checkpoint]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,7 +33,7 @@ from agents.shipping import ship
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.files import BusyError, locked
 
-ID = "LeanYaw/Heading-v0"
+ID = "LeanYaw/Heading-v1"
 TINY = PPOSettings(
     steps=1280, walkers=8, steps_per_update=32, batch_size=128, epochs=2, hidden=(8, 8)
 )
@@ -155,6 +156,20 @@ def test_pushes_of_the_training_are_no_part_of_what_the_policy_is_for():
     )
 
 
+def test_a_training_of_shorter_episodes_is_for_the_environment_s_own():
+    settings = replace(TINY, horizon=6.0)
+    trained = train_agent("ppo", ID, settings, progress=False)
+    assert trained.policy.card.options == EnvOptions()
+    assert trained.log.lengths.max() < 12  # steps of 0.73 or so
+    assert trained.log.survived.any()
+
+
+def test_training_leaves_no_folder_behind(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    train_agent("ppo", ID, replace(TINY, steps=256), progress=False)
+    assert not list(tmp_path.iterdir())
+
+
 def test_training_leaves_torch_s_threads_as_they_were():
     before = torch.get_num_threads()
     small = PPOSettings(steps=64, walkers=4, steps_per_update=16, batch_size=64, epochs=1)
@@ -227,7 +242,7 @@ def test_finished_runs_are_shipped_and_loaded_by_id_and_others_are_refused(tmp_p
         ship(folder)
     result = run(folder, progress=False)
     (shipped,) = ship(folder)
-    assert shipped == tmp_path / "trained" / "Heading-v0" / "ppo" / "seed3"
+    assert shipped == tmp_path / "trained" / "Heading-v1" / "ppo" / "seed3"
     names = ["evaluation.json", "policy.json", "policy.safetensors"]
     assert sorted(path.name for path in shipped.iterdir()) == names
     assert load(ID, seed=3).card == result.policy.card

@@ -96,7 +96,7 @@ def test_settings_of_the_package_make_agents_and_lie_where_they_are_tuned():
             if AGENTS[agent].kind == "learned":
                 assert set(values) <= {*values_of(settings_for(agent, task))}
                 continue
-            made = make_agent(agent, AgentRequest(f"LeanYaw/{task}-v0", EnvOptions()))
+            made = make_agent(agent, AgentRequest(f"LeanYaw/{task}-v1", EnvOptions()))
             if agent != "mpc":  # which needs the environment
                 width = len(ObservationLayout.of(task, EnvOptions()).names)
                 assert np.abs(made.predict(np.zeros((2, width)))[0]).max() <= 1.0
@@ -190,7 +190,7 @@ def test_values_that_make_no_agent_rank_last_and_are_not_run(monkeypatch):
 
     monkeypatch.setattr(study, "_mean_return", returns)
     monkeypatch.setattr(spaces, "STEPS_PER_DECISION", 300)  # of which few make plans enough
-    found = quiet(Tuning("mpc", "Push", episodes=1), 8)
+    found = quiet(Tuning("mpc", "Metastable", episodes=1), 8)
     values = [trial.value for trial in found.trials]
     assert values[0] == 1.0 and -math.inf in values
     assert len(tried) == values.count(1.0)
@@ -205,7 +205,7 @@ def test_a_tuning_runs_the_episodes_that_it_judges_by(monkeypatch):
     assert best is not None and best.value is not None and 0.0 < best.value <= 4.0
 
 
-@pytest.mark.parametrize("task", ["Push", "Level", "Heading"])
+@pytest.mark.parametrize("task", ["Metastable", "Level", "Heading"])
 def test_plans_tried_take_no_more_steps_for_a_decision_than_allowed(task):
     space = space_of("mpc", task)
     drawn = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
@@ -294,8 +294,8 @@ def test_another_tuning_or_another_file_is_refused_and_left_alone(tmp_path, monk
     quiet(GAINS, 1, storage)
     with pytest.raises(ValueError, match="storage must be the study of the same tuning"):
         quiet(replace(GAINS, episodes=3), 2, storage)
-    with pytest.raises(ValueError, match="storage must be the file of 'lqr Push'"):
-        quiet(Tuning("lqr", "Push", 1), 1, storage)
+    with pytest.raises(ValueError, match="storage must be the file of 'lqr Metastable'"):
+        quiet(Tuning("lqr", "Metastable", 1), 1, storage)
     text, other = tmp_path / "text.db", tmp_path / "other.db"
     text.write_text("no study at all, but some other text " * 100)
     with sqlite3.connect(other) as database:
@@ -337,7 +337,7 @@ def test_shorter_trainings_do_not_make_the_shipped_ones_shorter(untrained, tmp_p
     assert json.loads(out.read_text())["values"]["steps"] == TINY.steps
 
 
-@pytest.mark.parametrize("record", ["[]", '{"agent": "lqr"}', '{"agent": "lqr", "task": "Push", "values": {"x": 1}}'])  # fmt: skip
+@pytest.mark.parametrize("record", ["[]", '{"agent": "lqr"}', '{"agent": "lqr", "task": "Metastable", "values": {"x": 1}}'])  # fmt: skip
 def test_what_no_tuning_left_is_not_shipped(kept, tmp_path, record):
     file = tmp_path / "best.json"
     file.write_text(record)

@@ -38,7 +38,7 @@ def test_the_motion_between_heel_strikes_joins_the_episodes_states():
 
 def test_pushes_are_told_in_standard_deviations_of_the_task():
     steps = record_episode(
-        FixedController(), "Push", seed=first_seed("validation", 1), most_time=12.0
+        FixedController(), "Metastable", seed=first_seed("validation", 1), most_time=12.0
     ).steps
     sizes = np.array([step.push for step in steps[1:]])
     assert 0.1 < np.abs(sizes).mean() < 2.0  # 0.8 of normal numbers, of some ten here
@@ -46,7 +46,7 @@ def test_pushes_are_told_in_standard_deviations_of_the_task():
 
 def test_a_film_lasts_as_long_as_asked(tmp_path):
     path = tmp_path / "push.gif"
-    film_agent(FixedController(), "Push", path, seconds=0.5, fps=10.0, size=(480, 360), name="fixed")  # fmt: skip
+    film_agent(FixedController(), "Metastable", path, seconds=0.5, fps=10.0, size=(480, 360), name="fixed")  # fmt: skip
     with Image.open(path) as film:
         assert film.size == (480, 360)
         assert film.n_frames == 5  # pyright: ignore[reportAttributeAccessIssue]

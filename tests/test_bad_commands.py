@@ -69,7 +69,7 @@ COMMANDS: dict[tuple[str, str], tuple[list[str], dict[str, tuple[str, ...]]]] = 
             "--steering-tilt": (*POSITIVE, "2"), "--spring-stiffness": (*NUMBER, "-1"), "--damping": (*NUMBER, "-1"), **SPEEDS, **PLOT,
         },
     ),
-    ("lean-yaw", "play"): (["LeanYaw/Level-v0"], {"ENV_ID": ("no-such-name", "LeanYaw/Heading-v7"), "--speed": POSITIVE, "--seed": SEEDS}),
+    ("lean-yaw", "play"): (["LeanYaw/Level-v1"], {"ENV_ID": ("no-such-name", "LeanYaw/Heading-v7"), "--speed": POSITIVE, "--seed": SEEDS}),
     ("lean-yaw", "view"): ([], {"--walk": ("no-such-file.json",), "--port": (*SEEDS, "99999")}),
     ("lean-yaw", "reproduce"): (["table1"], {"NAMES": TEXT, "--out": ()}),
     ("lean-yaw", "findings"): ([], {"--out": ()}),
@@ -90,7 +90,7 @@ COMMANDS: dict[tuple[str, str], tuple[list[str], dict[str, tuple[str, ...]]]] = 
         },
     ),
     ("agents", "capture"): (
-        ["--agents", "fixed", "--task", "Push", "--starts", "1", "--points", "2"],
+        ["--agents", "fixed", "--task", "Metastable", "--starts", "1", "--points", "2"],
         {
             "--task": TEXT, "--agents": TEXT, "--out": (), "--agent-path": ("no-such-folder",), "--runs": (), "--starts": COUNT,
             "--points": COUNT, "--friction-limit": POSITIVE,

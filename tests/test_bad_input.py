@@ -171,7 +171,7 @@ def vec_env() -> sb3.WalkerVecEnv:
 
 @functools.cache
 def policy() -> agents.Policy:
-    return agents.load("LeanYaw/Heading-v0")
+    return agents.load("LeanYaw/Heading-v1")
 
 
 def step_sb3(actions: Any) -> Any:
@@ -559,6 +559,7 @@ ROWS |= {
             "push_level": number(-0.1, 11.0),
             "pumping": OFFSET,
             "goal_radius": POSITIVE,
+            "is_ranked": FLAG,
         },
         free=(
             "name",
@@ -854,9 +855,9 @@ ROWS |= {
     # --- agents
     "load": Row(
         constant(agents.load),
-        {"source": "LeanYaw/Heading-v0"},
+        {"source": "LeanYaw/Heading-v1"},
         {
-            "source": (None, 3, "", ["a"]), "env_id": (3, "LeanYaw/Walk-v0", ["a"]), "algorithm": (3, "sca", ["a"], ""),
+            "source": (None, 3, "", ["a"]), "env_id": (3, "LeanYaw/Walk-v1", ["a"]), "algorithm": (3, "sca", ["a"], ""),
             "seed": optional((*SEED, 10**6)),
         },
     ),
@@ -864,14 +865,14 @@ ROWS |= {
         constant(agents.save), lambda: {"policy": policy(), "folder": Path("x")}, {"policy": OBJECT, "folder": (None, 3, ["a"])}
     ),
     "shipped_seeds": Row(
-        constant(agents.shipped_seeds), {"env_id": "LeanYaw/Heading-v0"}, {"env_id": (None, 3, "", ["a"]), "algorithm": (None, 3, "Sca!", ["a"])}
+        constant(agents.shipped_seeds), {"env_id": "LeanYaw/Heading-v1"}, {"env_id": (None, 3, "", ["a"]), "algorithm": (None, 3, "Sca!", ["a"])}
     ),
     "make_agent": Row(
-        constant(agents.make_agent), {"name": "fixed", "request": agents.AgentRequest("LeanYaw/Walk-v0", envs.EnvOptions())}, {"name": NAME, "request": OBJECT}
+        constant(agents.make_agent), {"name": "fixed", "request": agents.AgentRequest("LeanYaw/Walk-v1", envs.EnvOptions())}, {"name": NAME, "request": OBJECT}
     ),
     "AgentRequest": Row(
         constant(agents.AgentRequest),
-        {"env_id": "LeanYaw/Walk-v0", "options": envs.EnvOptions()},
+        {"env_id": "LeanYaw/Walk-v1", "options": envs.EnvOptions()},
         {
             "env_id": (None, 3, "", ["a"]), "options": OBJECT, "seed": (None, *SEED), "path": (3, ["a"]), "runs": (3, ["a"]),
         },

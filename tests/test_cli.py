@@ -275,13 +275,13 @@ def test_play_opens_a_window_in_which_the_walker_walks(monkeypatch: pytest.Monke
         return [pygame.event.Event(pygame.QUIT)] if len(pictures) == 6 else []
 
     monkeypatch.setattr(pygame.event, "get", events)
-    result = runner.invoke(app, ["play", "LeanYaw/Heading-v0", "--seed", "1"])
+    result = runner.invoke(app, ["play", "LeanYaw/Heading-v1", "--seed", "1"])
     assert result.exit_code == 0, result.output
     assert len(set(pictures)) == 6
     assert not pygame.display.get_init()
 
 
-@pytest.mark.parametrize("env_id", ["LeanYaw/Nowhere-v0", "CartPole-v1"])
+@pytest.mark.parametrize("env_id", ["LeanYaw/Nowhere-v1", "CartPole-v1"])
 def test_play_refuses_what_is_no_walker(env_id: str) -> None:
     result = runner.invoke(app, ["play", env_id])
     assert (

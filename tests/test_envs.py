@@ -68,7 +68,7 @@ def _same(a: Any, b: Any) -> bool:
 def test_checkers_are_silent(task: str, options: dict[str, Any]) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        env = gym.make(f"LeanYaw/{task}-v0", disable_env_checker=True, **options).unwrapped
+        env = gym.make(f"LeanYaw/{task}-v1", disable_env_checker=True, **options).unwrapped
         check_env(env, skip_render_check=True)
         check_env_of_sb3(env)
 
@@ -76,14 +76,14 @@ def test_checkers_are_silent(task: str, options: dict[str, Any]) -> None:
 def test_checkers_are_silent_with_pictures() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        env = gym.make("LeanYaw/Heading-v0", render_mode="rgb_array", disable_env_checker=True)
+        env = gym.make("LeanYaw/Heading-v1", render_mode="rgb_array", disable_env_checker=True)
         check_env(env.unwrapped, skip_render_check=True)
 
 
 def test_make_s_own_wrappers_find_nothing_to_warn_of() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        env = gym.make("LeanYaw/Walk-v0")
+        env = gym.make("LeanYaw/Walk-v1")
         env.reset(seed=1)
         env.step(env.action_space.sample())
         env.close()
@@ -133,7 +133,7 @@ def _walk(env: gym.Env[Any, Any], steps: int = 100) -> list[Any]:
 
 
 def test_a_made_environment_is_copied_with_its_wrappers_and_its_spec() -> None:
-    env = gym.make("LeanYaw/Heading-v0", max_episode_steps=10)
+    env = gym.make("LeanYaw/Heading-v1", max_episode_steps=10)
     env.reset(seed=1)
     env.step(ZERO)
     for other in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
@@ -245,7 +245,7 @@ import json, warnings
 import gymnasium as gym, numpy as np
 import lean_yaw_env
 warnings.simplefilter("ignore")  # of numbers that are meant to overflow
-env = gym.make("LeanYaw/Slalom-v0", sensor_noise=0.1)
+env = gym.make("LeanYaw/Slalom-v1", sensor_noise=0.1)
 seen = [env.reset(seed=1)[0]] + [env.step(np.array([0.1, 0.2], np.float32))[0] for _ in range(3)]
 print(json.dumps([list(map(float, each)) for each in seen]))
 """
@@ -377,19 +377,21 @@ def test_rewards_are_rates_times_the_step_s_duration() -> None:
         assert reward == pytest.approx(info["duration"] * (1.0 - 0.05 * effort), rel=1e-6)
 
 
-def test_heading_commands_last_forty_to_seventy_nine_steps() -> None:
+def test_heading_commands_last_29_to_58_units_of_time() -> None:
     env = WalkerEnv("Heading", start_disturbance=0.0, horizon=math.inf)
     _, info = env.reset(seed=6)
-    commands = [info["commanded_heading"]]
+    commands, times = [info["commanded_heading"]], [0.0]
     for _ in range(1_200):
         *_, terminated, _, info = env.step(ZERO)
         assert not terminated
         commands.append(info["commanded_heading"])
+        times.append(info["time"])
     changes = np.flatnonzero(np.diff(commands))
-    lengths = np.diff(changes)
+    lengths = np.diff(np.array(times)[changes + 1])
+    step = 0.73  # each is in force from the first heel strike when it is due or later
     assert len(lengths) > 10
-    assert lengths.min() >= 40
-    assert lengths.max() <= 79
+    assert 29.0 - step < lengths.min() < 35.0
+    assert 52.0 < lengths.max() < 58.0 + step
     assert np.abs(commands).max() <= 0.6
     assert info["commands"] == len(changes) + 1
 
@@ -474,7 +476,7 @@ def test_starts_stray_from_the_gait_as_far_as_documented(gait: Vector) -> None:
 def test_a_video_is_recorded(tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the encoder's own
-        env = RecordVideo(gym.make("LeanYaw/Heading-v0", render_mode="rgb_array"), str(tmp_path))
+        env = RecordVideo(gym.make("LeanYaw/Heading-v1", render_mode="rgb_array"), str(tmp_path))
         env.reset(seed=1)
         for _ in range(3):
             env.step(ZERO)
@@ -500,7 +502,7 @@ def test_frames_are_pictures_that_change_with_the_walk() -> None:
 
 
 def test_a_list_of_frames_shows_the_motion_within_steps_at_the_rate_it_states() -> None:
-    env = gym.make("LeanYaw/Heading-v0", render_mode="rgb_array_list")
+    env = gym.make("LeanYaw/Heading-v1", render_mode="rgb_array_list")
     env.reset(seed=1)
     (first,) = env.render()
     for _ in range(4):
@@ -530,7 +532,7 @@ def test_pictures_of_a_step_begin_and_end_with_those_of_its_heel_strikes() -> No
 
 
 def test_a_fall_is_drawn_where_the_walker_fell() -> None:
-    env = WalkerEnv("Push", render_mode="rgb_array", push_level=5.0)
+    env = WalkerEnv("Metastable", render_mode="rgb_array", push_level=5.0)
     env.reset(seed=0)
     terminated = False
     while not terminated:
@@ -540,9 +542,9 @@ def test_a_fall_is_drawn_where_the_walker_fell() -> None:
 
 
 def test_in_real_time_a_step_is_a_frame_and_an_episode_the_same() -> None:
-    plain = gym.make("LeanYaw/Heading-v0", horizon=4.0)
+    plain = gym.make("LeanYaw/Heading-v1", horizon=4.0)
     expected = _episode(plain, seed=3)
-    env = RealTime(gym.make("LeanYaw/Heading-v0", render_mode="rgb_array", horizon=4.0), fps=20)
+    env = RealTime(gym.make("LeanYaw/Heading-v1", render_mode="rgb_array", horizon=4.0), fps=20)
     rng = np.random.default_rng(3)
     seen: list[Any] = [env.reset(seed=3)]
     ended, frames, action = False, 0, rng.uniform(-1.0, 1.0, 2).astype(np.float32)
@@ -566,7 +568,7 @@ def test_gymnasium_records_films_in_real_time(tmp_path: Path) -> None:
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the encoder's own
-        walker = gym.make("LeanYaw/Heading-v0", render_mode="rgb_array")
+        walker = gym.make("LeanYaw/Heading-v1", render_mode="rgb_array")
         env = RecordVideo(RealTime(walker), str(tmp_path))
         env.reset(seed=1)
         for _ in range(40):
@@ -594,7 +596,7 @@ def test_gymnasiums_play_steers_by_keys(monkeypatch: pytest.MonkeyPatch) -> None
             pygame.event.post(pygame.event.Event(pygame.QUIT))
 
     walker = gym.make(
-        "LeanYaw/Heading-v0", render_mode="rgb_array", mirror=False, start_disturbance=0.0
+        "LeanYaw/Heading-v1", render_mode="rgb_array", mirror=False, start_disturbance=0.0
     )
     play(RealTime(walker, speed=4.0), callback=after_frame, fps=1000, seed=0, noop=ZERO)
     assert len(headings) == 60
@@ -609,10 +611,10 @@ def test_in_real_time_there_is_nothing_to_draw_before_the_first_episode() -> Non
 
 def test_real_time_is_for_walkers_that_can_be_drawn() -> None:
     with pytest.raises(ValueError, match='render_mode="rgb_array"'):
-        RealTime(gym.make("LeanYaw/Walk-v0"))
+        RealTime(gym.make("LeanYaw/Walk-v1"))
     with pytest.raises(ValueError, match="must be an environment of lean_yaw_env"):
         RealTime(gym.make("CartPole-v1"))
-    drawn = gym.make("LeanYaw/Walk-v0", render_mode="rgb_array")
+    drawn = gym.make("LeanYaw/Walk-v1", render_mode="rgb_array")
     for change in ({"fps": 0}, {"speed": 0.0}):
         with pytest.raises(ValueError, match="must be"):
             RealTime(drawn, **change)
@@ -649,7 +651,7 @@ def test_keys_cover_what_can_be_held_and_steer_to_their_side() -> None:
     "name", ["TimeAwareObservation", "NumpyToTorch", "RecordEpisodeStatistics"]
 )
 def test_gymnasium_s_wrappers_take_it(name: str) -> None:
-    env = getattr(gym.wrappers, name)(gym.make("LeanYaw/Push-v0", max_episode_steps=5))
+    env = getattr(gym.wrappers, name)(gym.make("LeanYaw/Metastable-v1", max_episode_steps=5))
     env.reset(seed=1)
     zero = env.unwrapped.action_space.sample() * 0
     if name == "NumpyToTorch":

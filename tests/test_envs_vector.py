@@ -133,7 +133,7 @@ def test_spaces_are_gymnasium_s() -> None:
 
 
 def test_make_vec_makes_it() -> None:
-    env = gym.make_vec("LeanYaw/Walk-v0", num_envs=3, vectorization_mode="vector_entry_point")
+    env = gym.make_vec("LeanYaw/Walk-v1", num_envs=3, vectorization_mode="vector_entry_point")
     assert isinstance(env.unwrapped, WalkerVectorEnv)
     observations, _ = env.reset(seed=1)
     assert observations.shape == (3, 6)
@@ -256,17 +256,17 @@ def test_copied_episodes_go_on_bit_for_bit(how: str, mode: str) -> None:
 
 
 def test_steps_are_limited_as_gymnasium_limits_them() -> None:
-    ours = gym.make_vec("LeanYaw/Walk-v0", num_envs=2, max_episode_steps=5)
-    theirs = SyncVectorEnv([lambda: gym.make("LeanYaw/Walk-v0", max_episode_steps=5)] * 2)
+    ours = gym.make_vec("LeanYaw/Walk-v1", num_envs=2, max_episode_steps=5)
+    theirs = SyncVectorEnv([lambda: gym.make("LeanYaw/Walk-v1", max_episode_steps=5)] * 2)
     assert _differences(ours.reset(seed=1), theirs.reset(seed=1)) == []
     actions = np.zeros((2, 2), np.float32)
     for _ in range(12):
         assert _differences(ours.step(actions), theirs.step(actions)) == []
     with pytest.raises(ValueError, match="max_episode_steps must be from 1"):
-        gym.make_vec("LeanYaw/Walk-v0", num_envs=2, max_episode_steps=0)
+        gym.make_vec("LeanYaw/Walk-v1", num_envs=2, max_episode_steps=0)
 
 
-@pytest.mark.parametrize("env_id", ["LeanYaw/Walk-v0", "LeanYaw/WaypointGoal-v0"])
+@pytest.mark.parametrize("env_id", ["LeanYaw/Walk-v1", "LeanYaw/WaypointGoal-v1"])
 def test_a_spec_carries_the_largest_number_of_steps_and_makes_the_same_again(env_id: str) -> None:
     assert gym.spec(env_id).max_episode_steps is None
     env = gym.make_vec(env_id, num_envs=2, max_episode_steps=5)
@@ -457,7 +457,7 @@ def test_gymnasium_records_a_video_of_many_walkers(tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the encoder's own
         env = gym.wrappers.vector.RecordVideo(
-            gym.make_vec("LeanYaw/Heading-v0", num_envs=4, render_mode="rgb_array"),
+            gym.make_vec("LeanYaw/Heading-v1", num_envs=4, render_mode="rgb_array"),
             str(tmp_path),
             video_length=3,
         )
@@ -484,7 +484,7 @@ def test_too_many_walkers_to_draw_are_refused() -> None:
 
 
 def test_tensors_share_the_arrays_memory() -> None:
-    env = gym.wrappers.vector.NumpyToTorch(gym.make_vec("LeanYaw/Push-v0", num_envs=4))
+    env = gym.wrappers.vector.NumpyToTorch(gym.make_vec("LeanYaw/Metastable-v1", num_envs=4))
     observations, info = env.reset(seed=1)
     assert observations.dtype == torch.float32
     for _ in range(20):
@@ -494,7 +494,7 @@ def test_tensors_share_the_arrays_memory() -> None:
     assert rewards.dtype == torch.float64
     assert terminated.dtype == torch.bool
     lean = gym.wrappers.vector.NumpyToTorch(
-        gym.make_vec("LeanYaw/Push-v0", num_envs=4, copy=False, step_info=False)
+        gym.make_vec("LeanYaw/Metastable-v1", num_envs=4, copy=False, step_info=False)
     )
     observations, _ = lean.reset(seed=1)
     own = lean.unwrapped
@@ -506,7 +506,7 @@ def test_arguments_for_other_vector_environments_are_refused_by_gymnasium_with_t
     None
 ):
     with pytest.raises(gym.error.Error, match="only through kwargs"):
-        gym.make_vec("LeanYaw/Walk-v0", num_envs=2, vector_kwargs={"copy": False})
-    made = gym.make_vec("LeanYaw/Walk-v0", num_envs=2, copy=False).unwrapped
+        gym.make_vec("LeanYaw/Walk-v1", num_envs=2, vector_kwargs={"copy": False})
+    made = gym.make_vec("LeanYaw/Walk-v1", num_envs=2, copy=False).unwrapped
     assert isinstance(made, WalkerVectorEnv)
     assert made.copy is False

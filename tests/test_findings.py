@@ -175,7 +175,7 @@ def agent_rows(task: str, name: str, limit: str) -> list[dict[str, str]]:
     return [row for row in rows_of("capture.csv") if (row["task"], row["agent"], row["friction_limit"]) == wanted]  # fmt: skip
 
 
-@pytest.mark.parametrize(("task", "name", "limit"), [("Push", "ppo", "inf"), ("Heading", "ppo", "inf"), ("Push", "ppo", "0.6")])  # fmt: skip
+@pytest.mark.parametrize(("task", "name", "limit"), [("Metastable", "ppo", "inf"), ("Heading", "ppo", "inf"), ("Metastable", "ppo", "0.6")])  # fmt: skip
 def test_what_an_agent_saves_is_what_the_page_says(task: str, name: str, limit: str) -> None:
     agent = make_agent(name, AgentRequest(env_id_of(task), EnvOptions()))
     report = examine_capture(name, agent, task, friction_limit=float(limit), points=3)
@@ -190,13 +190,13 @@ def test_training_against_pushes_doubles_the_basin_and_training_without_shrinks_
         return float(agent_rows(task, name, "inf")[0]["saved_of_all"])
 
     for name in ("ppo", "sac"):
-        assert of_all("Push", name) > 2.0 * of_all("Push", "fixed")
+        assert of_all("Metastable", name) > 2.0 * of_all("Metastable", "fixed")
     assert of_all("Heading", "ppo") < of_all("Heading", "fixed") < of_all("Heading", "feedback")
 
 
 def test_on_a_floor_of_less_friction_the_policy_of_push_slips() -> None:
-    agent = make_agent("ppo", AgentRequest(env_id_of("Push"), EnvOptions()))
-    free, slippery = (closed_loop(agent, "Push", EnvOptions(friction_limit=limit)) for limit in (np.inf, FRICTION))  # fmt: skip
+    agent = make_agent("ppo", AgentRequest(env_id_of("Metastable"), EnvOptions()))
+    free, slippery = (closed_loop(agent, "Metastable", EnvOptions(friction_limit=limit)) for limit in (np.inf, FRICTION))  # fmt: skip
     starts = box_starts(free, 300)
     before, after = walk_many(free, starts, 62), walk_many(slippery, starts, 62)
     lost = before.survived & ~after.survived

@@ -14,7 +14,7 @@ from agents.learning.ppo import PPOSettings
 from agents.learning.recorder import read_checkpoint
 from benchmarks.gradient import Curve, policy_in, save_comparison, table
 
-ID = "LeanYaw/Heading-v0"
+ID = "LeanYaw/Heading-v1"
 PPO = PPOSettings(steps=256, walkers=8, steps_per_update=16, batch_size=64, epochs=1, hidden=(8, 8))
 APG = GradientSettings(
     steps=256, walkers=8, window=8, critic_first=0, critic_epochs=1, critic_batches=2, hidden=(8, 8)

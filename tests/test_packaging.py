@@ -20,8 +20,8 @@ from lean_yaw_env.agents.evaluation.scoring import run_episodes
 from lean_yaw_env.envs.options import EnvOptions
 
 options = EnvOptions(horizon=5.0)
-agents = {"fixed": FixedController(), "ppo": load("LeanYaw/Walk-v0")}
-agents["feedback"] = make_agent("feedback", AgentRequest("LeanYaw/Heading-v0", EnvOptions()))
+agents = {"fixed": FixedController(), "ppo": load("LeanYaw/Walk-v1")}
+agents["feedback"] = make_agent("feedback", AgentRequest("LeanYaw/Heading-v1", EnvOptions()))
 tasks = {"feedback": "Heading"}
 print(json.dumps({
     name: run_episodes(agent, tasks.get(name, "Walk"), episodes=2, options=options).metrics["return"].tolist()

@@ -30,6 +30,7 @@ from lean_yaw_env.envs.walker_env import WalkerEnv
 from lean_yaw_env.registration import ENV_IDS, TASK_VERSIONS
 
 TASKS = tuple(TASK_VERSIONS)
+COMMANDED = [name for name in TASKS if "command_left" in task_named(name).initial.dtype.names]
 BODY = ("hip_width", "foot_radius", "ankle_tilt", "slope")
 HARD = {
     "none": {},
@@ -136,17 +137,51 @@ def test_a_step_that_takes_no_time_leaves_numbers_numbers(task: str) -> None:
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_the_horizon_is_simulated_time_and_truncates(task: str) -> None:
-    env = WalkerEnv(task, horizon=3.0, push_level=0.0, start_disturbance=0.0)
-    env.reset(seed=0)
-    time = 0.0
+def test_rewards_and_sums_count_to_the_horizon_and_no_further(task: str) -> None:
+    env, longer = (
+        WalkerEnv(task, horizon=horizon, push_level=0.0, start_disturbance=0.0)
+        for horizon in (3.0, 300.0)
+    )
+    for each in (env, longer):
+        each.reset(seed=0)
     truncated = terminated = False
     while not (truncated or terminated):
-        before = time
-        _, _, terminated, truncated, info = env.step(ZERO)
-        time = info["time"]
-    assert truncated
-    assert before < 3.0 <= time
+        before = env.simulation.walkers[0].copy()
+        _, reward, terminated, truncated, info = env.step(ZERO)
+        _, whole, _, _, onward = longer.step(ZERO)
+    assert truncated and not terminated
+    assert before["time"] < 3.0 < onward["time"]
+    assert info["time"] == 3.0
+    assert info["duration"] == onward["duration"]
+    share = (3.0 - before["time"]) / info["duration"]
+    assert reward == pytest.approx(share * whole, abs=1e-15)
+    advance = onward["distance"] - before["distance"]
+    assert info["distance"] == pytest.approx(before["distance"] + share * advance, abs=1e-12)
+
+
+@pytest.mark.parametrize("task", COMMANDED)
+def test_commands_come_at_times_that_do_not_depend_on_the_steps(task: str) -> None:
+    schedules = []
+    for angle in (-0.3, 0.3):  # short and long steps
+        env = WalkerEnv(task, push_level=0.0, start_disturbance=0.0, random_body="nominal")
+        env.reset(seed=0)
+        record, schedule, due = env.simulation.tasks, [], 0.0
+        action = np.array([angle, 0.6 if env.task.pumping else 0.0], dtype=np.float32)
+        truncated = terminated = False
+        time = before = 0.0
+        while not (truncated or terminated):
+            if record["since_command"][0] == 0.0:
+                assert before <= due <= time
+                due = time + float(record["command_left"][0])
+                schedule.append((due, float(record["command"][0])))
+            before = time
+            *_, terminated, truncated, info = env.step(action)
+            time = info["time"]
+        assert truncated
+        schedules.append(schedule)
+    # sums of about 200 steps' durations
+    np.testing.assert_allclose(*schedules, rtol=0.0, atol=1e-11)
+    assert len(schedules[0]) > 3
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -317,10 +352,10 @@ def test_slope_and_friction_replace_the_parameters() -> None:
         ({"sensor_noise": -0.1}, r"sensor_noise must be in \[0, 10\], got -0.1"),
         ({"push_level": 11.0}, r"push_level must be in \[0, 10\], got 11"),
         ({"action_delay": 1}, "action_delay must be True or False, got 1"),
-        ({"hidden_rates": None}, "hidden_rates must be True or False"),
+        ({"hidden_rates": 1}, "hidden_rates must be True or False"),
         (
             {"random_body": "test"},
-            "random_body must be one of training, held-out, got 'test'",
+            "random_body must be one of nominal, training, held-out, got 'test'",
         ),
         ({"random_body": ["training"]}, "random_body must be one of"),
         ({"slope": 1.0}, r"slope must be in \[-0.5, 0.5\], got 1.0"),
@@ -406,15 +441,20 @@ def test_speed_heading_reports_both_errors() -> None:
     assert info["mean_absolute_speed_error"] == pytest.approx(speed / time, abs=1e-12)
 
 
-def test_goals_are_set_all_round_and_at_their_distance() -> None:
-    simulation = started("Waypoint", 2000, start_disturbance=0.0).simulation
+@pytest.mark.parametrize(
+    ("task", "nearest", "farthest"), [("Waypoint", 4.0, 8.0), ("WaypointGoal", 8.0, 16.0)]
+)
+def test_goals_are_set_all_round_and_at_their_distance(
+    task: str, nearest: float, farthest: float
+) -> None:
+    simulation = started(task, 2000, start_disturbance=0.0).simulation
     aside = 0.5 * 0.3 * simulation.walkers["side"]  # the walker's middle, at heading ~ 0
     x = simulation.tasks["goal_x"]
     z = simulation.tasks["goal_z"] - aside
     distance = np.hypot(x, z)
     # the gait's footprints head 0.0015 rad to one side, which moves the middle by 0.0003
-    assert 8.0 - 1e-3 < distance.min() < 8.1
-    assert 15.9 < distance.max() < 16.0 + 1e-3
+    assert nearest - 1e-3 < distance.min() < nearest + 0.1
+    assert farthest - 0.1 < distance.max() < farthest + 1e-3
     quarters = np.histogram(np.arctan2(z, x), bins=4, range=(-np.pi, np.pi))[0]
     assert np.all(np.abs(quarters - 500) < 6 * math.sqrt(500))
 
@@ -440,7 +480,7 @@ def test_approaching_pays_and_reaching_sets_another_goal() -> None:
             assert info["goal_distance"] > waypoints.RADIUS
     # at most 3 - 0.5 away, in steps of 0.3
     assert 8 <= info["steps"] <= 10
-    assert 8.0 <= info["goal_distance"] <= 16.0
+    assert 4.0 <= info["goal_distance"] <= 8.0
 
 
 def test_where_the_slope_turns_the_heading_is_not_shown() -> None:
@@ -512,7 +552,7 @@ def test_slalom_ends_three_leg_lengths_off_the_path_without_reward() -> None:
 def test_harder_pushes_end_walks_sooner() -> None:
     steps = []
     for level in (0.2, 0.4, 0.8):
-        envs = started("Push", 64, push_level=level)
+        envs = started("Metastable", 64, push_level=level)
         walked = np.zeros(64)
         alive = np.ones(64, dtype=bool)
         for _ in range(100):
@@ -523,19 +563,9 @@ def test_harder_pushes_end_walks_sooner() -> None:
     assert steps[0] > steps[1] + 10.0 > steps[2] + 20.0
 
 
-def test_push_counts_two_hundred_steps() -> None:
-    env = WalkerEnv("Push", push_level=0.0, start_disturbance=0.0)
-    env.reset(seed=0)
-    for _ in range(199):
-        *_, info = env.step(ZERO)
-    assert info["survived_200_steps"] == 0.0
-    *_, info = env.step(ZERO)
-    assert info["survived_200_steps"] == 1.0
-
-
-@pytest.mark.parametrize("slope", [0.0, -0.005])
-def test_level_starts_in_the_gait_of_pumping(slope: float) -> None:
-    env = WalkerEnv("Level", slope=slope, start_disturbance=0.0)
+@pytest.mark.parametrize("task", ["Level", "LevelUphill"])
+def test_level_starts_in_the_gait_of_pumping(task: str) -> None:
+    env = WalkerEnv(task, start_disturbance=0.0)
     first, _ = env.reset(seed=0)
     for _ in range(6):
         observation, _, _, _, info = env.step(np.array([0.0, 0.6], dtype=np.float32))
@@ -548,24 +578,24 @@ def test_level_starts_in_the_gait_of_pumping(slope: float) -> None:
 def pumping(observations: np.ndarray, steering: float) -> np.ndarray:
     """Alternate the offset away from the stance foot, more or less of it by the heading error."""
     actions = np.zeros((len(observations), 2), np.float32)
-    actions[:, 1] = 0.6 - steering * observations[:, -1]
+    actions[:, 1] = 0.4 - steering * observations[:, -1]
     return actions
 
 
-@pytest.mark.parametrize("slope", [0.0, -0.005])
-def test_level_is_walked_and_steered_by_pumping_alone(slope: float) -> None:
+@pytest.mark.parametrize("task", ["Level", "LevelUphill"])
+def test_level_is_walked_and_steered_by_pumping_alone(task: str) -> None:
     n = 32
     errors = []
-    for steering in (0.0, 0.6):
-        envs = started("Level", n, slope=slope)
-        for _ in range(300):  # of 0.5 to 0.55 units of time, within the horizon
+    for steering in (0.0, 0.2):
+        envs = started(task, n)
+        for _ in range(180):  # of 0.5 to 1 units of time, within the horizon
             _, _, terminated, truncated, info = envs.step(
                 pumping(envs.simulation.observations, steering)
             )
             assert not terminated.any()
             assert not truncated.any()
         errors.append(info["mean_absolute_heading_error"].mean())
-    # measured over 256 whole episodes: 0.31 to 0.36 straight on, 0.15 to 0.17 steered
+    # measured: 0.33 straight on and 0.23 steered on the level, 0.42 and 0.25 uphill
     assert errors[1] < 0.75 * errors[0]
 
 

@@ -42,7 +42,7 @@ for _ in range(10):
 state = env.get_state()
 env.set_state(state)
 
-many = WalkerVectorEnv(8, "LeanYaw/Walk-v0", step_info=False)
+many = WalkerVectorEnv(8, "LeanYaw/Walk-v1", step_info=False)
 observations, _ = many.reset(seed=1, options={"stance": "left"})
 actions = np.zeros((8, 2), dtype=np.float32)
 observations, rewards, terminations, truncations, _ = many.step(actions)

@@ -30,7 +30,7 @@ from lean_yaw_env.viewer import PageServer
 from lean_yaw_env.walker import Walk
 
 OUT = Path(__file__).parents[1] / "docs" / "images" / "walking.webp"
-ENV_ID = "LeanYaw/Heading-v0"
+ENV_ID = "LeanYaw/Heading-v1"
 STEPS = 27
 PUSHES = {4: -0.3}
 """What is added to the ankle rate at the heel strike before a step: below zero, a push to the left."""

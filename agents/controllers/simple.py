@@ -118,6 +118,8 @@ class HeadingGains:
     """Rad of inter-leg angle per speed that is lacking."""
     pumping: Pumping = field(default_factory=Pumping)
     """Offsets away from the stance foot that drive the walker beside the slope."""
+    pumping_by_speed: float = 0.0
+    """What is added to them per commanded speed above 0.42."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -188,10 +190,13 @@ class HeadingFeedback(MemorylessController):
         ankle_rate = layout.quantity(seen, "ankle_rate") - side * self._gait_ankle_rate
         holding = -self._tangent * np.sin(heading + error)
         from_downhill = heading if self._has_downhill else np.zeros_like(heading)
+        pumped = gains.pumping.along(from_downhill)
+        if _SPEED in layout.names:
+            pumped += gains.pumping_by_speed * (layout.quantity(seen, _SPEED) - _MIDDLE_SPEED)
         return (
             gains.feedforward * holding
             - gains.proportional * error
             + gains.ankle * ankle
             + gains.ankle_rate * ankle_rate
-            + side * gains.pumping.along(from_downhill)
+            + side * pumped
         )

@@ -156,14 +156,15 @@ def closed_loop(
         If the agent plans, remembers or draws, if the options add noise, delay or random bodies, or a command is not one of the task.
     """
     chosen = EnvOptions() if options is None else options
-    if chosen.sensor_noise or chosen.action_delay or chosen.random_body is not None:
+    chosen_task = task_named(task)
+    has_bodies = chosen.for_task(chosen_task).random_body != "nominal"
+    if chosen.sensor_noise or chosen.action_delay or has_bodies or chosen_task.slope_varies:
         raise ValueError(
-            "options must have no sensor_noise, action_delay or random_body, so that the closed loop is one map of the state"
+            "options must have no sensor_noise, action_delay or random_body, and the task one slope, so that the closed loop is one map of the state"
         )
     if isinstance(agent, Planner):
         raise ValueError("agent must answer from its observation alone, but it plans on the environment")  # fmt: skip
     quiet = replace(chosen, push_level=0.0, start_disturbance=0.0)
-    chosen_task = task_named(task)
     interface = TaskInterface(chosen_task, quiet, commands or {})
     _require_one_answer(agent, interface.observe(interface.start[None], "left"))
 

@@ -27,7 +27,7 @@ from .pictures import save_agents_footprints, save_leaderboard_plot, save_push_l
 from .plan import Candidate, Evaluation, make_candidate
 from .row_tables import IMAGES, bracketed, csv_table, iqm, markdown_table, mean, rows_to_csv
 
-LEVELS_TASK, LEVELS_METRIC = "Push", "survived_200_steps"
+LEVELS_TASK, LEVELS_METRIC = "Metastable", "time_walked"
 """What is evaluated at other push levels too, by which metric."""
 LEVELS = (0.2, 0.4, 0.6, 0.8, 1.0)
 _RANKED = ("planner", "learned", ENTERED)
@@ -66,7 +66,7 @@ def make_leaderboard(
     starts: int = 1024,
     points: int = 61,
 ) -> tuple[list[Row], list[Results]]:
-    """Evaluate agents at their tasks, and Push's at other levels, and write page, numbers and pictures into a folder.
+    """Evaluate agents at their tasks, and Metastable's at other levels, and write page, numbers and pictures into a folder.
 
     Return the rows and the candidates' results at the tasks as they are.
 
@@ -143,7 +143,7 @@ def fixed_rivals(candidates: Sequence[Candidate], evaluation: Evaluation) -> dic
 def level_candidates(
     candidates: Sequence[Candidate], levels: Sequence[float] = LEVELS
 ) -> list[Candidate]:
-    """The agents of Push once for each level."""
+    """The agents of Metastable once for each level."""
     return [
         replace(candidate, options=replace(candidate.options, push_level=level))
         for level in levels
@@ -153,7 +153,7 @@ def level_candidates(
 
 
 def level_rows(found: Sequence[Results]) -> dict[float, list[Row]]:
-    """By push level, how many walkers of each agent of Push survive; the task's own level among them."""
+    """By push level, how long walkers of each agent of Metastable stay up; the task's own level among them."""
     rows: dict[float, list[Row]] = {}
     for each in found:
         if each.task == LEVELS_TASK:
@@ -221,10 +221,10 @@ def leaderboard_page(
             parts.append(f"![Where each agent saves and loses states]({picture})")
     if levels:
         parts += [
-            "## Push at other push levels",
-            "Share of walkers that survive 200 steps, with the same agents.",
+            "## Metastable at other push levels",
+            "Mean time walked, with the same agents.",
             _levels_table(levels),
-            "![Survival against push level](images/push_levels.png)",
+            "![Time walked against push level](images/push_levels.png)",
         ]
     return "\n\n".join(parts) + "\n"
 

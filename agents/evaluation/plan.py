@@ -159,9 +159,10 @@ class Evaluation:
 
     def _candidate(self, name: str, task: str, request: AgentRequest) -> Candidate:
         episodes = min(self.episodes, self.costly_episodes) if _plans(name) else self.episodes
-        is_learned = agent_entry(name).kind == "learned"
-        folders = policy_folders(name, request) if is_learned else []
-        return Candidate(task, name, episodes, self.options, tuple(folders) or (None,))
+        entry = agent_entry(name)
+        folders = policy_folders(name, request) if entry.kind == "learned" else []
+        options = entry.needed_options(self.options)
+        return Candidate(task, name, episodes, options, tuple(folders) or (None,))
 
     def run(self, candidates: Sequence[Candidate]) -> list[Results]:
         """Let every candidate run the episodes of the seed; the same ones at the same task.

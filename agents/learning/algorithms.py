@@ -20,9 +20,11 @@ from ..settings import tuned
 from .apg import GradientLearner, GradientSettings
 from .her import HERLearner, HERSettings
 from .learner import Learner, LearnerSettings, settings_to_plain
-from .ppo import PPOLearner, PPOSettings
+from .ppo import FramesSettings, PPOLearner, PPOSettings
 from .recorder import CheckpointError, Recorder, Report, TrainingLog
+from .recurrent import RecurrentLearner, RecurrentSettings
 from .sac import SACLearner, SACSettings
+from .tqc import TQCLearner, TQCSettings
 
 
 @dataclass(frozen=True)
@@ -35,18 +37,37 @@ class Trained:
 
 @dataclass(frozen=True)
 class Algorithm:
-    """An algorithm: the class of its settings, a ``LearnerSettings``; its learner's class; and the tasks that it can learn."""
+    """A learning algorithm.
+
+    Attributes
+    ----------
+    settings : the class of its settings, a ``LearnerSettings``
+    make : its learner's class
+    tasks : that it can learn
+    shipped : tasks whose trained agents come with the package
+    seeds : number of these for each task
+    """
 
     settings: type[Any]
     make: Callable[..., Learner]
     tasks: tuple[str, ...] = ALL_TASKS
+    shipped: tuple[str, ...] = ()
+    seeds: int = 5
 
 
+_TASKS = tuple(TASK_VERSIONS)
+_UNKNOWN = ("UnknownBody",)
 ALGORITHMS: dict[str, Algorithm] = {
-    "ppo": Algorithm(PPOSettings, PPOLearner),
-    "sac": Algorithm(SACSettings, SACLearner),
-    "apg": Algorithm(GradientSettings, GradientLearner, tuple(TASK_VERSIONS)),
-    "her": Algorithm(HERSettings, HERLearner, (GOAL_TASK,)),
+    "ppo": Algorithm(PPOSettings, PPOLearner, shipped=_TASKS, seeds=10),
+    "sac": Algorithm(SACSettings, SACLearner, shipped=("Metastable",)),
+    "apg": Algorithm(
+        GradientSettings, GradientLearner, _TASKS, shipped=("Heading", "SpeedHeading", "Slalom")
+    ),
+    "tqc": Algorithm(TQCSettings, TQCLearner),
+    "frames": Algorithm(FramesSettings, PPOLearner, shipped=_UNKNOWN),
+    "recurrent": Algorithm(RecurrentSettings, RecurrentLearner, shipped=_UNKNOWN),
+    "oracle": Algorithm(PPOSettings, PPOLearner, _UNKNOWN, shipped=_UNKNOWN),
+    "her": Algorithm(HERSettings, HERLearner, (GOAL_TASK,), shipped=(GOAL_TASK,), seeds=1),
 }
 """By the names that their policies carry."""
 

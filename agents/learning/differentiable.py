@@ -136,9 +136,9 @@ class DifferentiableWalkers:
         return torch.stack([angle, offset, 0.5 * (first * first + second * second)], dim=1)
 
     def _outputs(self) -> NDArray[np.float64]:
-        """The numbers of the step just made, as the Jacobians' rows name them; a fall takes no time here."""
-        simulation = self._simulation
-        durations = np.where(simulation.terminated, 0.0, simulation.walkers["duration"])
+        """The numbers of the step just made, as the Jacobians' rows name them; a fall takes no time here, and time ends at the horizon."""
+        simulation, walkers = self._simulation, self._simulation.walkers
+        durations = np.where(simulation.terminated, 0.0, walkers["share"] * walkers["duration"])
         observations = simulation.observations.astype(np.float64)
         return np.column_stack(
             [self._linearised.values(), observations, simulation.rewards, durations]

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from sb3_contrib.common.recurrent.buffers import RecurrentRolloutBuffer
 from stable_baselines3.common.buffers import ReplayBuffer, RolloutBuffer
 from stable_baselines3.common.type_aliases import DictReplayBufferSamples, ReplayBufferSamples
 from stable_baselines3.common.vec_env import VecNormalize
@@ -58,6 +59,10 @@ class TimeDiscountedBuffer(RolloutBuffer):
             advantage = surprises[step] + discounts[step] * self.gae_lambda * advantage
             self.advantages[step] = advantage
         self.returns = self.advantages + self.values
+
+
+class TimeDiscountedSequences(TimeDiscountedBuffer, RecurrentRolloutBuffer):
+    """The same for sb3-contrib's rollout buffer, which keeps sequences and the states of the memory."""
 
 
 class TimeDiscountedReplay(ReplayBuffer):

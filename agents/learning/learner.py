@@ -38,6 +38,7 @@ class LearnerSettings:
     push_level : random pushes in training only, in place of the environment's (``EnvOptions.push_level``); None for the environment's own
         Pushes show the policy states that it would not reach by itself, and leave a margin: without pushes, some trained policies walk so
         close to falling that a few episodes in a thousand end in a fall.
+    horizon : of the episodes in training only, in place of the environment's (``EnvOptions.horizon``); None for the environment's own
     """
 
     steps: int
@@ -47,6 +48,7 @@ class LearnerSettings:
     time_constant: float = 24.0
     hidden: tuple[int, ...] = (64, 64)
     push_level: float | None = None
+    horizon: float | None = None
 
     @property
     def typical_discount(self) -> float:
@@ -69,6 +71,8 @@ class LearnerSettings:
         self.require_shares("final_learning_rate")
         if self.push_level is not None:
             require_number("push_level", self.push_level, 0.0, 10.0)
+        if self.horizon is not None:
+            require_number("horizon", self.horizon, 0.0, math.inf, "()")
         if not isinstance(self.hidden, tuple) or not self.hidden:
             raise ValueError(f"hidden must name one layer or more, got {self.hidden!r}")
         for units in self.hidden:
@@ -91,7 +95,8 @@ class LearnerSettings:
 
     def training_options(self, options: EnvOptions) -> EnvOptions:
         """The environment's options in the training."""
-        return options if self.push_level is None else replace(options, push_level=self.push_level)
+        own = {"push_level": self.push_level, "horizon": self.horizon}
+        return replace(options, **{name: each for name, each in own.items() if each is not None})
 
 
 class Learner(Protocol):

@@ -35,9 +35,10 @@ class PPOSettings(LearnerSettings):
     value_weight : weight of the value's loss
     largest_gradient : norm that gradients are clipped to
     initial_log_std : logarithm of the standard deviation of actions at the start
+    frames : latest observations that the networks see; 1 sees no memory
     """
 
-    steps: int = 4_000_000
+    steps: int = 2_000_000
     walkers: int = 256
     steps_per_update: int = 128
     batch_size: int = 2048
@@ -48,6 +49,7 @@ class PPOSettings(LearnerSettings):
     value_weight: float = 0.5
     largest_gradient: float = 0.5
     initial_log_std: float = -0.5
+    frames: int = 1
 
     @property
     def update_steps(self) -> int:
@@ -55,7 +57,7 @@ class PPOSettings(LearnerSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.require_counts("steps_per_update", "batch_size", "epochs")
+        self.require_counts("steps_per_update", "batch_size", "epochs", "frames")
         self.require_shares("gae_lambda")
         self.require_positive("clip_range", "largest_gradient")
         for name in ("entropy", "value_weight"):
@@ -65,6 +67,13 @@ class PPOSettings(LearnerSettings):
             raise ValueError(
                 f"batch_size must divide the {self.update_steps} samples of an update, got {self.batch_size}"
             )
+
+
+@dataclass(frozen=True)
+class FramesSettings(PPOSettings):
+    """Settings of PPO whose policy sees its latest observations."""
+
+    frames: int = 8
 
 
 class PPOLearner(StableBaselinesLearner):
@@ -77,24 +86,34 @@ class PPOLearner(StableBaselinesLearner):
     def make_model(self, settings: PPOSettings, **common: Any) -> PPO:
         return PPO(
             "MlpPolicy",
-            n_steps=settings.steps_per_update,
-            batch_size=settings.batch_size,
-            n_epochs=settings.epochs,
-            gamma=settings.typical_discount,
-            gae_lambda=settings.gae_lambda,
-            clip_range=settings.clip_range,
-            ent_coef=settings.entropy,
-            vf_coef=settings.value_weight,
-            max_grad_norm=settings.largest_gradient,
-            policy_kwargs={
-                "net_arch": list(settings.hidden),
-                "log_std_init": settings.initial_log_std,
-                "activation_fn": torch.nn.Tanh,
-            },
+            policy_kwargs=self.network_arguments(settings),
             rollout_buffer_class=TimeDiscountedBuffer,
             rollout_buffer_kwargs={"time_constant": settings.time_constant},
+            **self.model_arguments(settings),
             **common,
         )
+
+    def model_arguments(self, settings: PPOSettings) -> dict[str, Any]:
+        """Arguments of the model."""
+        return {
+            "n_steps": settings.steps_per_update,
+            "batch_size": settings.batch_size,
+            "n_epochs": settings.epochs,
+            "gamma": settings.typical_discount,
+            "gae_lambda": settings.gae_lambda,
+            "clip_range": settings.clip_range,
+            "ent_coef": settings.entropy,
+            "vf_coef": settings.value_weight,
+            "max_grad_norm": settings.largest_gradient,
+        }
+
+    def network_arguments(self, settings: PPOSettings) -> dict[str, Any]:
+        """Arguments of the networks."""
+        return {
+            "net_arch": list(settings.hidden),
+            "log_std_init": settings.initial_log_std,
+            "activation_fn": torch.nn.Tanh,
+        }
 
     @property
     def buffer(self) -> TimedBuffer:

@@ -28,7 +28,7 @@ from ..policies.policy_files import (
     save,
     task_of,
 )
-from ..registry import AgentRequest, env_id_of, make_all
+from ..registry import AgentRequest, agent_entry, env_id_of, make_all
 from ..seeds import MOST_EPISODES, first_seed, training_seed
 from ..settings import with_values
 from .algorithms import ALGORITHMS, algorithm_for, settings_for, train
@@ -60,6 +60,7 @@ class Training:
     checkpoint_seconds : least time between two checkpoints
     tensorboard : write TensorBoard's logs too
     algorithm : a name in ``ALGORITHMS``
+    is_compared : evaluate and draw the baselines and feedback controllers too
     """
 
     env_id: str
@@ -71,6 +72,7 @@ class Training:
     checkpoint_seconds: float = 5.0
     tensorboard: bool = False
     algorithm: str = "ppo"
+    is_compared: bool = True
 
     def __post_init__(self) -> None:
         training_seed(self.seed)
@@ -81,7 +83,8 @@ class Training:
         require_count("episodes", self.episodes, 1, MOST_EPISODES)
         require_count("threads", self.threads, 1, 1024)
         require_number("checkpoint_seconds", self.checkpoint_seconds, 0.0, math.inf)
-        require_flag("tensorboard", self.tensorboard)
+        for name in ("tensorboard", "is_compared"):
+            require_flag(name, getattr(self, name))
 
     @classmethod
     def of_task(
@@ -104,7 +107,9 @@ class Training:
         settings = settings_for(others.get("algorithm", cls.algorithm), task)
         if steps is not None:
             settings = replace(settings, steps=steps)
-        return cls(env_id, seed, settings, options or EnvOptions(), **others)
+        agent = agent_entry(others.get("algorithm", cls.algorithm))
+        needed = agent.needed_options(options or EnvOptions())
+        return cls(env_id, seed, settings, needed, **others)
 
     @property
     def task(self) -> str:
@@ -218,7 +223,8 @@ def _run(folder: Path, training: Training, progress: bool, report: Report | None
     _write_statistics(folder, policy)
     log.write(folder / LOG_FILE)
     request = AgentRequest(training.env_id, training.options, seed=training.seed)
-    agents = make_all(request, ("baseline", "feedback")) | {training.algorithm: policy}
+    others = make_all(request, ("baseline", "feedback")) if training.is_compared else {}
+    agents = others | {training.algorithm: policy}
     total = training.episodes * len(agents)
     with tqdm(total=total, desc="evaluating", unit="episode", disable=not progress) as bar:
         rows = evaluate(

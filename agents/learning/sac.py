@@ -10,6 +10,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from stable_baselines3 import SAC
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from torch.optim import Optimizer
 
 from lean_yaw_env.envs.options import ACTION_SIZE
@@ -62,8 +64,8 @@ class SACSettings(LearnerSettings):
         require_number("target_entropy", self.target_entropy, -100.0, 100.0)
 
 
-class EvenlyStartedSAC(SAC):
-    """SB3's SAC whose first random actions come from numpy's shared generator, as all else does, so that they can be resumed."""
+class EvenlyStarted(OffPolicyAlgorithm):
+    """An algorithm whose first random actions come from numpy's shared generator, as all else does, so that they can be resumed."""
 
     def _sample_action(
         self, learning_starts: int, action_noise: Any = None, n_envs: int = 1
@@ -72,6 +74,10 @@ class EvenlyStartedSAC(SAC):
             return super()._sample_action(learning_starts, action_noise, n_envs)
         drawn = np.random.uniform(-1.0, 1.0, (n_envs, ACTION_SIZE)).astype(np.float32)  # noqa: NPY002
         return drawn, drawn
+
+
+class EvenlyStartedSAC(EvenlyStarted, SAC):
+    """SB3's SAC, resumable."""
 
 
 class SACLearner(StableBaselinesLearner):
@@ -84,11 +90,12 @@ class SACLearner(StableBaselinesLearner):
     activation = "relu"
     output = "tanh"
     network = "MlpPolicy"
+    algorithm: type[Any] = EvenlyStartedSAC
     replay: type[Any] = TimeDiscountedReplay
-    model: EvenlyStartedSAC
+    model: Any
 
-    def make_model(self, settings: SACSettings, **common: Any) -> EvenlyStartedSAC:
-        return EvenlyStartedSAC(
+    def make_model(self, settings: SACSettings, **common: Any) -> BaseAlgorithm:
+        return self.algorithm(
             self.network,
             buffer_size=settings.buffer_size,
             learning_starts=settings.random_steps,

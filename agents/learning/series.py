@@ -8,10 +8,9 @@ import re
 import signal
 import sys
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import dataclass
-from multiprocessing.connection import wait
-from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from tqdm import tqdm
 from lean_yaw_env.errors import LeanYawError
 from lean_yaw_env.files import locked, read_json, write_json, write_text
 from lean_yaw_env.registration import ALL_ENV_IDS
-from lean_yaw_env.reporting import reporting, uninterrupted
+from lean_yaw_env.reporting import uninterrupted
 from lean_yaw_env.validation import require_choice, require_count
 
 from ..evaluation.episodes import RETURN
@@ -89,22 +88,37 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     return seeds
 
 
-def new_series(task: str, seeds: Sequence[int], out: Path, choices: Mapping[str, Any]) -> Path:
-    """Make a folder under ``out`` with one run for each seed; ``choices`` are other arguments of ``Training.of_task``.
+def trainings_of(task: str, seeds: Sequence[int], choices: Mapping[str, Any]) -> list[Training]:
+    """A training for each seed; ``choices`` are other arguments of ``Training.of_task``. The first alone evaluates the baselines too.
 
     Raises
     ------
     ValueError
-        If a choice is bad; nothing is written then.
+        If a choice is bad.
     """
-    trainings = {seed: Training.of_task(task, **{**choices, "seed": seed}) for seed in seeds}
-    first = next(iter(trainings.values()))
-    folder = new_folder(out, first, "seeds")
-    for seed, training in trainings.items():
-        make_run(training, folder / f"seed{seed}")
-    record = {"env_id": first.env_id, "algorithm": first.algorithm, "seeds": list(trainings)}
-    write_json(folder / SERIES_FILE, record)
+    return [
+        Training.of_task(task, **{**choices, "seed": seed, "is_compared": seed == seeds[0]})
+        for seed in seeds
+    ]
+
+
+def new_series(task: str, seeds: Sequence[int], out: Path, choices: Mapping[str, Any]) -> Path:
+    """Make a folder under ``out`` with one run for each of ``trainings_of``."""
+    trainings = trainings_of(task, seeds, choices)
+    folder = new_folder(out, trainings[0], "seeds")
+    make_series(trainings, folder)
     return folder
+
+
+def make_series(trainings: Sequence[Training], folder: Path) -> None:
+    """Make the folder of a series of trainings of different seeds, which must not exist."""
+    for training in trainings:
+        make_run(training, folder / f"seed{training.seed}")
+    first, seeds = trainings[0], [training.seed for training in trainings]
+    write_json(
+        folder / SERIES_FILE,
+        {"env_id": first.env_id, "algorithm": first.algorithm, "seeds": seeds},
+    )
 
 
 def is_series(folder: Path) -> bool:
@@ -191,10 +205,10 @@ def run_series(folder: Path, *, jobs: int = 1, progress: bool = True) -> SeriesR
     with locked(folder):
         unfinished = [place for place in runs.values() if not is_finished(place)]
         if jobs > 1 and len(unfinished) > 1:
-            run_side_by_side(unfinished, jobs, progress=progress)
+            deque(run_side_by_side(unfinished, jobs, progress=progress), maxlen=0)
         else:
             _run_each(unfinished, progress)
-        return _finished(folder, runs)
+        return finish_series(folder)
 
 
 def _run_each(folders: Sequence[Path], progress: bool) -> None:
@@ -208,8 +222,9 @@ def _run_each(folders: Sequence[Path], progress: bool) -> None:
         raise RunError("; ".join(failed))
 
 
-def _finished(folder: Path, runs: Mapping[int, Path]) -> SeriesResult:
+def finish_series(folder: Path) -> SeriesResult:
     """Draw and write what the finished runs of a series come to."""
+    runs = runs_of(folder)
     result = _result(runs)
     training = read_run(next(iter(runs.values())))
     median, lowest, highest = next(row[1:4] for row in result.rows() if row[0] == RETURN)
@@ -231,47 +246,49 @@ def _finished(folder: Path, runs: Mapping[int, Path]) -> SeriesResult:
     return result
 
 
-def run_side_by_side(folders: Sequence[Path], jobs: int, *, progress: bool = True) -> None:
-    """Finish runs, ``jobs`` of them at a time, each in a process of its own, under one bar.
+def run_side_by_side(
+    folders: Sequence[Path], jobs: int, *, progress: bool = True
+) -> Iterator[Path]:
+    """Finish runs in ``jobs`` processes under one bar; yield the folder of each that is finished.
 
     A run that fails does not stop the others; an interruption ends all processes, and their checkpoints stay.
 
     Raises
     ------
+    ValueError
+        If ``jobs`` is out of its range.
     RunError
-        If a process fails.
+        If a run fails, after the others.
     """
     # fresh interpreters: torch and compiled threads do not survive a fork
     context = multiprocessing.get_context("spawn")
-    done = {folder: context.Value("q", 0) for folder in folders}
-    waiting, failed = deque(folders), list[str]()
-    active: dict[Path, SpawnProcess] = {}
+    done = context.Array("q", len(folders))
+    earlier = multiprocessing.active_children()
+    pool = ProcessPoolExecutor(require_count("jobs", jobs), context, _begin_process, (done,))
     bar = tqdm(total=sum(map(_steps, folders)), unit="step", unit_scale=True, disable=not progress)
+    failed: list[str] = []
     try:
-        while waiting or active:
-            while waiting and len(active) < jobs:
-                folder = waiting.popleft()
-                process = context.Process(
-                    target=_run_in_process, args=(folder, done[folder]), daemon=True
-                )
-                with uninterrupted():
-                    process.start()
-                active[folder] = process
-            ended = len(folders) - len(active) - len(waiting)
-            bar.set_description(f"trainings done: {ended} of {len(folders)}", refresh=False)
-            wait([process.sentinel for process in active.values()], timeout=0.2)
-            for folder in [each for each, process in active.items() if not process.is_alive()]:
-                if (status := active.pop(folder).exitcode) != 0:
-                    failed.append(f"the training in {str(folder)!r} ended with status {status}")
-            bar.update(sum(steps.value for steps in done.values()) - bar.n)
+        with uninterrupted():
+            waiting = {pool.submit(_run_in_process, *each): each[1] for each in enumerate(folders)}
+        while waiting:
+            bar.set_description(f"trainings done: {len(folders) - len(waiting)} of {len(folders)}", refresh=False)  # fmt: skip
+            ended, _ = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
+            bar.update(sum(done[:]) - bar.n)
+            for future in ended:
+                folder, error = waiting.pop(future), future.exception()
+                if words := future.result() if error is None else repr(error):
+                    failed.append(f"the training in {str(folder)!r} failed: {words}")
+                else:
+                    yield folder
         if failed:
-            raise RunError(f"{'; '.join(failed)}; the messages are above")
+            raise RunError("; ".join(failed))
     finally:
         bar.close()
-        for process in active.values():
-            process.terminate()
-        for process in active.values():
-            process.join()
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in multiprocessing.active_children():
+            if process not in earlier:
+                process.terminate()
+                process.join()
 
 
 def _steps(folder: Path) -> int:
@@ -281,15 +298,28 @@ def _steps(folder: Path) -> int:
     return 0
 
 
-def _run_in_process(folder: Path, done: Any) -> None:
+_done: Any = None
+"""In a process of ``run_side_by_side``: the steps done of each run, shared with the others."""
+
+
+def _begin_process(done: Any) -> None:
+    global _done
+    _done = done
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that half-written files are removed
 
-    def report(steps: int, recent: float) -> None:
-        done.value = steps
 
-    with reporting("train"):
+def _run_in_process(index: int, folder: Path) -> str:
+    """Finish a run; return what went wrong, or nothing."""
+
+    def report(steps: int, recent: float) -> None:
+        _done[index] = steps
+
+    try:
         run(folder, progress=False, report=report)
+    except (ValueError, OSError, LeanYawError) as error:
+        return str(error)
+    return ""
 
 
 def seeds_table(result: SeriesResult) -> Table:

@@ -12,8 +12,9 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.running_mean_std import RunningMeanStd
-from stable_baselines3.common.vec_env import VecNormalize
+from stable_baselines3.common.vec_env import VecEnv, VecFrameStack, VecNormalize
 from torch.optim import Optimizer
 
 from lean_yaw_env.envs.options import EnvOptions
@@ -86,7 +87,9 @@ class StableBaselinesLearner:
         self._walkers = WalkerVecEnv(
             settings.walkers, self.environment(env_id), threads=threads, **walking
         )
-        self._normaliser = self.normalised(self._walkers, settings)
+        frames = getattr(settings, "frames", 1)
+        self._frames = VecFrameStack(self._walkers, frames) if frames > 1 else None
+        self._normaliser = self.normalised(self._frames or self._walkers, settings)
         self.model = self.make_model(
             settings,
             env=self._normaliser,
@@ -95,6 +98,8 @@ class StableBaselinesLearner:
             seed=seed,
             device="cpu",
         )
+        if tensorboard is None:  # SB3's own logger makes a folder among the temporary files
+            self.model.set_logger(Logger(folder=None, output_formats=[]))
         self._walkers.seed(first)  # in place of the policy's seed, which SB3 gives them too
         # what SB3 has from the first step on, so that a state has the same parts before it
         self.model._last_obs = self.model._last_original_obs = self._no_observations()
@@ -104,7 +109,7 @@ class StableBaselinesLearner:
         """The task or the environment's id that the walkers train at."""
         return task_of(env_id)
 
-    def normalised(self, walkers: WalkerVecEnv, settings: LearnerSettings) -> VecNormalize:
+    def normalised(self, walkers: VecEnv, settings: LearnerSettings) -> VecNormalize:
         """The walkers with normalised observations and rewards."""
         return VecNormalize(
             walkers,
@@ -170,6 +175,7 @@ class StableBaselinesLearner:
             "last": {"observations": model._last_obs, "starts": model._last_episode_starts},
             "normaliser": {"returns": self._normaliser.returns},
             "walkers": self._walkers.snapshot(),
+            **({"frames": self._frames.stacked_obs.stacked_obs} if self._frames else {}),
             "torch": torch.get_rng_state(),
             "numpy": {key: random[key] for key in ("state", "has_gauss", "gauss")},
         }
@@ -187,6 +193,8 @@ class StableBaselinesLearner:
                 raise ValueError(f"{name} must have a variance of 0 or more")
         self._normaliser.returns = state["normaliser"]["returns"]
         self._walkers.restore(state["walkers"])
+        if self._frames is not None:
+            self._frames.stacked_obs.stacked_obs = state["frames"]
         model.num_timesteps, model._n_updates = int(state["steps"]), int(state["updates"])
         model._last_obs, model._last_episode_starts = (
             state["last"][k] for k in ("observations", "starts")
@@ -197,7 +205,7 @@ class StableBaselinesLearner:
         np.random.set_state({"bit_generator": "MT19937", **state["numpy"]})  # noqa: NPY002
 
     def _no_observations(self) -> Any:
-        space, n = self._walkers.observation_space, self._walkers.num_envs
+        space, n = self._normaliser.observation_space, self._walkers.num_envs
         if isinstance(space, spaces.Dict):
             return {
                 key: np.zeros((n, *(each.shape or ())), each.dtype) for key, each in space.items()

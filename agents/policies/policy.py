@@ -41,7 +41,10 @@ NORMALISED_LIMIT = 10.0
 LOG_STD_LIMITS = (np.float32(-20.0), np.float32(2.0))
 """Bounds of a logarithm of a deviation that a layer gives, as in Stable-Baselines3's SAC."""
 
-_PACKAGES = ("numpy", "scipy", "numba", "gymnasium", "torch", "stable-baselines3")
+MEMORY = "memory"
+"""Of the weights of an LSTM."""
+
+_PACKAGES = ("numpy", "scipy", "numba", "gymnasium", "torch", "stable-baselines3", "sb3-contrib")
 
 
 def package_versions() -> dict[str, str]:
@@ -95,14 +98,19 @@ class PolicyCard:
 
 
 class Policy:
-    """A multilayer perceptron from observations to actions, with Stable-Baselines3's ``predict``; it needs no torch.
+    """A small network from observations to actions, with Stable-Baselines3's ``predict``; it needs no torch.
+
+    It is a multilayer perceptron. What it remembers from step to step, if anything, is its latest observations, or the state of a long
+    short-term memory (LSTM; Hochreiter and Schmidhuber 1997) in front of the perceptron, or both. ``predict`` returns it and takes it.
 
     Parameters
     ----------
     card : what the policy is
     weights : float32 arrays by name
         ``layers.<k>.weight`` (outputs, inputs) and ``layers.<k>.bias`` (outputs,) for k = 0, 1, ...; ``observation_mean`` and
-        ``observation_variance`` (features,), which normalise observations; ``log_std`` (2,), the logarithm of the standard deviation of
+        ``observation_variance`` (features,), which normalise observations, or (frames features,) of a network that sees the latest frames,
+        the oldest first; of an LSTM ``memory.input`` (4 units, inputs), ``memory.state`` (4 units, units) and ``memory.bias`` (4 units,), for
+        the input, forget, cell and output gates; ``log_std`` (2,), the logarithm of the standard deviation of
         actions that are drawn, before they are kept in bounds, or ``log_std.weight`` and ``log_std.bias``, a layer beside the last that gives it.
     generator : draws actions for ``deterministic=False``; by default seeded by the card's seed
 
@@ -117,7 +125,11 @@ class Policy:
     ) -> None:
         self.card = card
         self.weights = dict(weights)
-        self.depth = _require_weights(self.weights, len(card.layout.names))
+        features = len(card.layout.names)
+        self.depth = _require_weights(self.weights, features)
+        earlier = len(self.weights["observation_mean"]) - features
+        units = len(self.weights.get(f"{MEMORY}.bias", ())) // 4
+        self._memory_sizes = (*((earlier,) if earlier else ()), *((units, units) if units else ()))
         self._scale = 1.0 / np.sqrt(
             self.weights["observation_variance"].astype(float) + NORMALISATION_FLOOR
         )
@@ -130,9 +142,24 @@ class Policy:
         episode_start: NDArray[np.bool_] | None = None,
         deterministic: bool = True,
     ) -> tuple[NDArray[np.float32], State]:
-        """The network's actions; see ``Agent.predict``. It remembers nothing."""
+        """The network's actions, and what it remembers; see ``Agent.predict``.
+
+        Raises
+        ------
+        ValueError
+            If the observation is none of the environment's, or the state not one of so many walkers.
+        """
         require_flag("deterministic", deterministic)
-        signal = before = self._normalised(self.card.layout.require(observation))
+        seen = self.card.layout.require(observation)
+        recalled = self._recalled(state, episode_start, seen.shape[:-1])
+        kept: tuple[NDArray[Any], ...] = ()
+        if len(self._memory_sizes) % 2:  # frames
+            frames = np.concatenate([recalled[0], seen], axis=-1)
+            seen, kept, recalled = frames, (frames[..., -self._memory_sizes[0] :],), recalled[1:]
+        signal = before = self._normalised(seen)
+        if recalled:
+            signal, cell = self._long_short_term(signal, *recalled)
+            before, kept = signal, (*kept, signal, cell)
         activate = ACTIVATIONS[self.card.activation]
         for k in range(self.depth):
             before, signal = signal, self._linear(f"layers.{k}", signal)
@@ -142,7 +169,31 @@ class Policy:
             signal = signal + np.exp(self._log_std(before)) * self._generator.standard_normal(
                 signal.shape, dtype=np.float32
             )
-        return OUTPUTS[self.card.output](signal), None
+        return OUTPUTS[self.card.output](signal), kept or None
+
+    def _recalled(
+        self, state: State, episode_start: NDArray[np.bool_] | None, batch: tuple[int, ...]
+    ) -> tuple[NDArray[Any], ...]:
+        """What is remembered of the episodes so far: zeros where they start."""
+        shapes = [(*batch, size) for size in self._memory_sizes]
+        if state is None or not shapes:
+            return tuple(np.zeros(shape, np.float32) for shape in shapes)
+        if [np.shape(each) for each in state] != shapes:
+            raise ValueError(
+                f"state must be what predict returned for these walkers, arrays of shapes {shapes}, got {[np.shape(each) for each in state]}"
+            )
+        goes_on = np.float32(1.0) - np.float32(0.0 if episode_start is None else episode_start)
+        return tuple(np.asarray(goes_on)[..., None] * each for each in state)
+
+    def _long_short_term(
+        self, signal: NDArray[np.float32], hidden: NDArray[np.float32], cell: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """The next hidden and cell states of the LSTM."""
+        gates = signal @ self.weights[f"{MEMORY}.input"].T + self.weights[f"{MEMORY}.bias"]
+        gates = gates + hidden @ self.weights[f"{MEMORY}.state"].T
+        taken, remembered, new, shown = np.split(gates, 4, axis=-1)
+        cell = _sigmoid(remembered) * cell + _sigmoid(taken) * np.tanh(new)
+        return _sigmoid(shown) * np.tanh(cell), cell
 
     def _linear(self, name: str, signal: NDArray[np.float32]) -> NDArray[np.float32]:
         return signal @ self.weights[f"{name}.weight"].T + self.weights[f"{name}.bias"]
@@ -158,16 +209,27 @@ class Policy:
         return np.clip(centred, -NORMALISED_LIMIT, NORMALISED_LIMIT).astype(np.float32)
 
 
+def _sigmoid(x: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.float32(0.5) + np.float32(0.5) * np.tanh(np.float32(0.5) * x)
+
+
 def _require_weights(weights: Weights, features: int) -> int:
     """Check names, shapes and values of a network's weights, and return its number of layers."""
     depth = sum(name.startswith("layers.") and name.endswith(".weight") for name in weights)
     if depth == 0:
         raise ValueError("weights must hold layers.0.weight, but hold no layer")
+    frames = max(1, len(np.atleast_1d(weights.get("observation_mean", ()))) // features)
+    inputs = before = frames * features
     expected: dict[str, tuple[int, ...]] = {
-        "observation_mean": (features,),
-        "observation_variance": (features,),
+        "observation_mean": (inputs,),
+        "observation_variance": (inputs,),
     }
-    inputs = before = features
+    if f"{MEMORY}.bias" in weights:
+        units = weights[f"{MEMORY}.bias"].size // 4
+        expected[f"{MEMORY}.input"] = (4 * units, inputs)
+        expected[f"{MEMORY}.state"] = (4 * units, units)
+        expected[f"{MEMORY}.bias"] = (4 * units,)
+        inputs = before = units
     for k in range(depth):
         name = f"layers.{k}.weight"
         shape = weights[name].shape if name in weights else ()

@@ -140,14 +140,14 @@ RANGES: dict[tuple[str, str], dict[str, Range]] = {
     ("lqr", "UTurn"): _LOOP | _ANGLE | _TURN | _PUMPING | _UPHILL,
     ("lqr", "Level"): _LOOP | _ANGLE | _TURN | _PUMPING,
     ("lqr", "Walk"): _LOOP | _ANGLE,
-    ("lqr", "Push"): _LOOP | _ANGLE | _PUMPING,
+    ("lqr", "Metastable"): _LOOP | _ANGLE | _PUMPING,
     ("lqr", "Slalom"): _GUIDED | {"ahead": (0.0, 6.0, False), "approach": (1.0, 30.0, True)},
     ("lqr", "Waypoint"): _GUIDED | {"radius": (1.0, 8.0, True), "persistence": (0.0, 2.0, False)},
 }
 """Of the numbers that are tuned, by agent and task and by their paths in the settings."""
 
 _CONDITIONS = {
-    ("lqr", "Push"): tuple(EnvOptions(push_level=x, horizon=150.0) for x in (0.5, 0.7, 1.0)),
+    ("lqr", "Metastable"): tuple(EnvOptions(push_level=x, horizon=150.0) for x in (0.5, 0.7, 1.0)),
     ("lqr", "Slalom"): (EnvOptions(horizon=100.0),),
 }
 """Episodes that are shorter than the task's, but long enough to tell good from bad, and several push levels at once."""
@@ -193,7 +193,11 @@ def _near(trial: Trial, path: str, start: float, entry: Range) -> float:
 STEPS_PER_DECISION = 2400
 """Walking steps of all plans together, near 2 ms on one core: the same for every trial, so that the search improves the plans and not the time they take."""
 _KNOTS = (0.0, 0.15, 0.35, 0.7)  # shares of the horizon
-_PUMPING_TASKS = ("Push", "UTurn", "Level")  # where the masses may change sides from step to step
+_PUMPING_TASKS = (
+    "Metastable",
+    "UTurn",
+    "Level",
+)  # where the masses may change sides from step to step
 
 _PLANS: dict[str, Range] = {
     "horizon": (1, 24, False),

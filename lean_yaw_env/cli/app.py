@@ -267,7 +267,7 @@ def _vehicle(record: records.Record, figure: Any) -> Output:
 
 @command()
 def play(
-    env_id: Annotated[str, typer.Argument(help="An environment, such as LeanYaw/Heading-v0.")],
+    env_id: Annotated[str, typer.Argument(help="An environment, such as LeanYaw/Heading-v1.")],
     speed: Annotated[float, typer.Option(help="Times real time for legs of a metre.")] = 0.5,
     seed: Annotated[int | None, typer.Option(help="Of the first episode.")] = None,
 ) -> Output:

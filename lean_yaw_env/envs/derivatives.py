@@ -3,8 +3,9 @@
 Complex numbers carry them: an imaginary part of 1e-30 on one input gives imaginary parts 1e-30 times the derivatives, to round-off and
 without a difference of nearby numbers. The walking step's own come from ``kernel.jacobian``.
 
-Inputs are what a step's result depends on: the walker's ``FOLLOWED`` fields before the step, the task's fields of which ``is_followed`` is
-set, then what is commanded (``COMMANDED``). Outputs are the followed fields after the step, the observation, the reward, the duration.
+Inputs are what a step's result depends on: the walker's ``FOLLOWED`` fields before the step, its slope where that varies, the task's fields
+of which ``is_followed`` is set, then what is commanded (``COMMANDED``). Outputs are the followed fields after the step, the observation, the
+reward, the duration. Of the step across the horizon, reward and duration count to the horizon, whose distance in time is taken as given.
 
 ``differentiate`` is a template, as ``outputs.write_outputs`` is.
 """
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from lean_yaw_env.envs.dynamics import move
+from lean_yaw_env.envs.formulas import counted_time
 from lean_yaw_env.envs.observation import (
     ANKLE_RATE,
     COMMON_CENTRES,
@@ -30,9 +32,17 @@ from lean_yaw_env.envs.observation import (
 )
 from lean_yaw_env.envs.outputs import compiled_for
 from lean_yaw_env.envs.simulation import Simulation
-from lean_yaw_env.envs.state import WALKER_FIELDS, Field, record_type, states_of
+from lean_yaw_env.envs.state import (
+    BODY_SIZE,
+    SLOPE,
+    WALKER_FIELDS,
+    Field,
+    record_type,
+    states_of,
+)
+from lean_yaw_env.envs.tasks import Task
 from lean_yaw_env.kernel.compilation import borrowed, formula, written_formula
-from lean_yaw_env.kernel.jacobian import OUTPUTS, step_jacobians
+from lean_yaw_env.kernel.jacobian import INPUTS, OUTPUTS, step_jacobians
 from lean_yaw_env.kernel.records import STEPPED, Command, Outcome
 from lean_yaw_env.parameters import STATE_FIELDS, STATE_SIZE, Vector
 from lean_yaw_env.threads import share_out
@@ -40,16 +50,21 @@ from lean_yaw_env.threads import share_out
 FOLLOWED = (*(field.name for field in STATE_FIELDS), "mass_offset", "place_x", "place_z")
 COMMANDED = ("inter_leg_angle", "commanded_offset", "effort")
 TINY = 1e-30
-# Of the walking step's inputs (``kernel.jacobian``): the state, the inter-leg angle, the offset, the offset before.
-_OFFSET_BEFORE, _ANGLE, _OFFSET = 7, 5, 6
+_KERNEL_INPUTS = {name: k for k, name in enumerate(INPUTS)} | {
+    "commanded_offset": INPUTS.index("mass_offset"),
+    "mass_offset": INPUTS.index("previous_offset"),
+}
+"""The walking step's input that a field is: the offset in force is the one before the step."""
 
 
-def _tables(fields: Sequence[Field]) -> dict[str, Any]:
-    """What ``differentiate`` takes of a task's fields: formulas that copy, seed and read records."""
-    own = _followed(fields)
-    seeds = [("walker", name) for name in FOLLOWED] + [("task", name) for name in own]
+def _tables(task: Task) -> dict[str, Any]:
+    """What ``differentiate`` takes of a task: formulas that copy, seed and read records."""
+    fields = task.fields
+    seeds = [("walker", name) for name in _followed_of_walker(task)]
+    seeds += [("task", name) for name in _followed(fields)]
+    followed_size = len(seeds)
     seeds += [("walker", name) for name in COMMANDED]
-    kernel = [*range(5), _OFFSET_BEFORE, -1, -1, *(-1 for _ in own), _ANGLE, _OFFSET, -1]
+    kernel = [_KERNEL_INPUTS.get(name, -1) for _, name in seeds]
     return {
         "COPY_WALKER": _copy(WALKER_FIELDS),
         "COPY_TASK": _copy(fields),
@@ -66,14 +81,19 @@ def _tables(fields: Sequence[Field]) -> dict[str, Any]:
             ("column", "walker", "task"),
             [
                 f"column[{k}] = {record}.{name}.imag / {TINY}"
-                for k, (record, name) in enumerate(seeds[: len(FOLLOWED) + len(own)])
+                for k, (record, name) in enumerate(seeds[:followed_size])
             ],
         ),
         "KERNEL_INPUTS": tuple(kernel),
-        "FOLLOWED_SIZE": len(FOLLOWED) + len(own),
+        "FOLLOWED_SIZE": followed_size,
         "WALKER_TYPE": record_type(WALKER_FIELDS, "c16"),
         "TASK_TYPE": record_type(fields, "c16"),
     }
+
+
+def _followed_of_walker(task: Task) -> tuple[str, ...]:
+    """Names of the fields of a walker's record that derivatives lead through at a task."""
+    return (*FOLLOWED, "slope") if task.slope_varies else FOLLOWED
 
 
 def _followed(fields: Sequence[Field]) -> tuple[str, ...]:
@@ -148,6 +168,9 @@ def read_observation(column, walker, task, settings):
         hides = abs(shown.real) > OBSERVATION_LIMIT or (is_rate and settings.hidden_rates != 0)
         column[row] = 0.0 if hides else shown.imag / TINY
         row += 1
+    if settings.show_body != 0:
+        column[row + SLOPE] = walker.slope.imag / settings.body_reach[SLOPE] / TINY
+        row += BODY_SIZE
     return row
 
 
@@ -181,18 +204,19 @@ def differentiate(befores, tasks_before, walkers, tasks, settings, steps, jacobi
             walker.commanded_offset = walkers[i].commanded_offset
             walker.effort = walkers[i].effort
             SEED(walker, task, k)
-            move(walker, step_outcome(befores[i], walkers[i], steps[i], KERNEL_INPUTS[k]))
+            outcome = step_outcome(befores[i], walkers[i], steps[i], KERNEL_INPUTS[k])
+            move(walker, outcome, common.horizon)
             walker.stance_pitch_rate += walkers[i].pitch_push
             walker.ankle_rate += walkers[i].ankle_push
             column = jacobians[i, :, k]
-            reward = TASK_REWARD(walker, task)
+            reward = walker.share * TASK_REWARD(walker, task)
             # what the task asks next is drawn, and no derivative leads through a draw
             COPY_TASK(task, tasks[i])
             TASK_REFRESH(walker, task)
             READ(column, walker, task)
             row = read_observation(column, walker, task, common)
             column[row] = reward.imag / TINY
-            column[row + 1] = walker.duration.imag / TINY
+            column[row + 1] = counted_time(walker).imag / TINY
 
 
 class LinearisedSteps:
@@ -217,16 +241,17 @@ class LinearisedSteps:
         self._threads = threads
         task = simulation.task
         observed = simulation.options.observation_names(task)
-        self.followed = (*FOLLOWED, *_followed(task.fields))
+        self.followed = (*_followed_of_walker(task), *_followed(task.fields))
         self.inputs = (*self.followed, *COMMANDED)
         self.outputs = (*self.followed, *observed, "reward", "duration")
         n = simulation.n
         self._differentiate = compiled_for(
-            task, differentiate, ("read_observation",), lambda: _tables(task.fields)
+            task, differentiate, ("read_observation",), lambda: _tables(task)
         )
         self._before = simulation.walkers.copy(), simulation.tasks.copy()
         self._afters = np.zeros(n), np.zeros((n, STATE_SIZE))
-        self._steps = np.zeros((n, len(OUTPUTS), STATE_SIZE + len(Command._fields)))
+        last = "slope" if task.slope_varies else Command._fields[-1]
+        self._steps = np.zeros((n, len(OUTPUTS), INPUTS.index(last) + 1))
 
     def prepare(self) -> None:
         """Note the records before a step."""
@@ -236,9 +261,10 @@ class LinearisedSteps:
     def values(self) -> Vector:
         """The followed fields as they are, shape (n, followed)."""
         walkers, tasks = self._simulation.walkers, self._simulation.tasks
-        own = self.followed[len(FOLLOWED) :]
-        columns = [walkers[name] for name in FOLLOWED] + [tasks[name] for name in own]
-        return np.column_stack(columns)
+        names = walkers.dtype.names or ()
+        return np.column_stack(
+            [(walkers if name in names else tasks)[name] for name in self.followed]
+        )
 
     def jacobians(self) -> Vector:
         """The derivatives of the step since ``prepare``, shape (n, outputs, inputs), in a fresh array; zeros for a step that was a fall."""

@@ -21,6 +21,7 @@ from lean_yaw_env.envs.observation import (
 )
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.reset import BODY_DEVIATIONS, HELD_OUT_REACH, START_DEVIATIONS
+from lean_yaw_env.envs.state import BODY_NAMES
 from lean_yaw_env.envs.tasks import Task, task_named
 from lean_yaw_env.files import write_text
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, PARAMETER_NAMES, STATE_FIELDS
@@ -106,8 +107,10 @@ def describe_task(task: Task) -> str:
     """One task: what it asks, its observation, reward and metrics."""
     body = task.parameters
     slope = f"{body.slope:g} rad" + (", turning with the walker" if body.slope_turns else "")
+    slope += ", varying" if task.slope_varies else ""
     facts = [
         ("slope", slope),
+        ("friction limit", f"{body.friction_limit:g}"),
         ("horizon", f"{task.horizon:g} units of time (truncation)"),
         ("ends", "; ".join(filter(None, ("a fall, a termination without reward", task.ends)))),
         ("reward per unit of time", task.reward_text),
@@ -115,10 +118,16 @@ def describe_task(task: Task) -> str:
         ("push level", f"{task.push_level:g}"),
         ("start", f"pumping by {task.pumping:g}" if task.pumping else "the gait on the slope"),
     ]
+    if task.random_body != "nominal":
+        box = zip(BODY_NAMES, task.body_reach, strict=True)
+        within = ", ".join(f"{name} within {reach:g}" for name, reach in box)
+        facts.append(("bodies", f"`{task.random_body}`: {within} of the middle"))
+    if task.hidden_rates:
+        facts.append(("rates", "hidden: shown as zero"))
     for name, command in task.commands.items():
         bounds = f"each in [{command.low:.4g}, {command.high:.4g}]"
         facts.append((f"reset option `{name}`", f"{command.meaning}; {bounds}"))
-    facts.append(("versions", "; ".join(task.history)))
+    facts.append(("versions", " ".join(task.history)))
     parts = [task.summary, table(("", ""), facts)]
     observed = [(f.name, f.unit, f"{f.centre:g}", f"{f.scale:g}", f.meaning) for f in task.observed]
     if observed:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from lean_yaw_env.envs.formulas import advance, mean_heading, positive
+from lean_yaw_env.envs.state import SLOPE
 from lean_yaw_env.kernel.batch import step_batch
 from lean_yaw_env.kernel.compilation import borrowed, entry_point, formula
 from lean_yaw_env.kernel.random import normal
@@ -53,10 +54,14 @@ def outcome_of(row: Any) -> Any:
 
 
 @formula
-def move(walker: Any, outcome: Any) -> None:
-    """Take a step's outcome into the record. A step that the solver gave up leaves the walker where it stood."""
+def move(walker: Any, outcome: Any, horizon: float) -> None:
+    """Take a step's outcome into the record. A step that the solver gave up leaves the walker where it stood.
+
+    Time, distance and work count to the horizon, a share of the step across it.
+    """
     walker.fall = int(outcome.status) - _STEPPED
     walker.steps += 1
+    walker.share = 1.0
     if outcome.status == FAILED:
         walker.duration = 0.0
         walker.advance = 0.0
@@ -78,14 +83,19 @@ def move(walker: Any, outcome: Any) -> None:
     walker.shift_work = outcome.shift_work
     walker.impact_loss = outcome.impact_loss
     walker.ankle_loss = outcome.ankle_loss
-    walker.time += outcome.duration
-    walker.work += positive(outcome.shift_work)
+    left = horizon - walker.time
+    if outcome.duration.real > left.real:
+        walker.share = left / outcome.duration
+        walker.time = horizon
+    else:
+        walker.time += outcome.duration
+    walker.work += walker.share * positive(outcome.shift_work)
     x = outcome.displacement_x
     z = outcome.displacement_z
     walker.place_x += x
     walker.place_z += z
     walker.advance = advance(x, z, mean_heading(walker))
-    walker.distance += walker.advance
+    walker.distance += walker.share * walker.advance
     # a heel strike at the very start of a step takes no time and tells nothing of speed
     if walks and outcome.duration.real > 0.0:
         walker.speed = walker.advance / outcome.duration
@@ -116,6 +126,7 @@ def walk_one(walkers, bodies, settings, actions):
     walker, common = walkers[0], settings[0]
     if not (np.isfinite(actions[0, 0]) and np.isfinite(actions[0, 1])):
         return False
+    bodies[0, SLOPE] = walker.slope
     command(walker, common, actions[0])
     outcome = walking_step(
         body_of(bodies[0]),
@@ -123,7 +134,7 @@ def walk_one(walkers, bodies, settings, actions):
         walker.heading, walker.stance_pitch, walker.ankle_angle,
         walker.stance_pitch_rate, walker.ankle_rate, walker.side,
     )  # fmt: skip
-    move(walker, outcome)
+    move(walker, outcome, common.horizon)
     push(walker, common)
     return True
 
@@ -152,7 +163,8 @@ def walk_many(walkers, bodies, settings, actions, skip, first, last):
     commands, sides = np.empty((size, 3)), np.empty(size)
     states, outcomes = np.empty((size, STATE_SIZE)), np.empty((size, OUTCOME_SIZE))
     owners = np.empty(size, dtype=np.int64)
-    own_bodies = np.empty((size if len(bodies) > 1 else 1, bodies.shape[1]))
+    one_each = len(bodies) == len(walkers)
+    own_bodies = np.empty((size if one_each else 1, bodies.shape[1]))
     for each in range(bodies.shape[1]):
         own_bodies[0, each] = bodies[0, each]
     i = first
@@ -163,7 +175,8 @@ def walk_many(walkers, bodies, settings, actions, skip, first, last):
                 walker = walkers[i]
                 command(walker, common, actions[i])
                 gather(walker, commands, states, sides, n)
-                if len(bodies) > 1:
+                if one_each:
+                    bodies[i, SLOPE] = walker.slope
                     for each in range(bodies.shape[1]):
                         own_bodies[n, each] = bodies[i, each]
                 owners[n] = i
@@ -172,5 +185,5 @@ def walk_many(walkers, bodies, settings, actions, skip, first, last):
         step_batch(own_bodies, commands, states, sides, outcomes, 0, n)
         for k in range(n):
             walker = walkers[owners[k]]
-            move(walker, outcome_of(outcomes[k]))
+            move(walker, outcome_of(outcomes[k]), common.horizon)
             push(walker, common)

@@ -60,6 +60,18 @@ def mean_heading(walker: Any) -> Any:
 
 
 @formula
+def counted_time(walker: Any) -> Any:
+    """How much of the last step's duration lies before the horizon: what sums over time add up."""
+    return walker.share * walker.duration
+
+
+@formula
+def ends_in_time(walker: Any) -> bool:
+    """Whether the last step ended before the horizon."""
+    return walker.share.real == 1.0
+
+
+@formula
 def advance(x: Any, z: Any, heading: Any) -> Any:
     """How far a displacement, downhill and to the right, leads along a heading."""
     return x * np.cos(heading) - z * np.sin(heading)

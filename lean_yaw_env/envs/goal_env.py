@@ -40,7 +40,7 @@ class GoalRules:
 
     ``achieved_goal`` and ``desired_goal`` have the shape (..., 2). With those that ``step`` returned, and its ``info``, the results are what
     ``step`` returned. ``info`` may be a mapping or a sequence of mappings; without the keys "fall" and "time" it tells of a walker that
-    neither fell nor came to the horizon. A step that ends in a fall reaches nothing.
+    neither fell nor came to the horizon. A step that ends in a fall, or after the horizon, reaches nothing.
     """
 
     simulation: Simulation
@@ -49,23 +49,26 @@ class GoalRules:
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Infos
     ) -> NDArray[np.float64]:
         """1 where the goal is reached, else 0; shape (...)."""
-        return (is_reached(achieved_goal, desired_goal) & ~_fell(info)).astype(np.float64)
+        is_in_time = ~(_fell(info) | self._is_over(info))
+        return (is_reached(achieved_goal, desired_goal) & is_in_time).astype(np.float64)
 
     def compute_terminated(
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Infos
     ) -> NDArray[np.bool_]:
         """Whether the goal is reached or the walker has fallen; shape (...)."""
-        return np.asarray(is_reached(achieved_goal, desired_goal) | _fell(info))
+        is_paid = self.compute_reward(achieved_goal, desired_goal, info) > 0.0
+        return np.asarray(is_paid | _fell(info))
 
     def compute_truncated(
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Infos
     ) -> NDArray[np.bool_]:
         """Whether the horizon, or the largest number of steps, cuts the episode; shape (...)."""
-        limits = self.simulation.settings[0]
-        is_late = (_numbers(info, "time") >= limits["horizon"]) | (
-            _numbers(info, "steps") >= limits["max_episode_steps"]
-        )
-        return np.asarray(is_late & ~self.compute_terminated(achieved_goal, desired_goal, info))
+        most = self.simulation.settings["max_episode_steps"][0]
+        is_cut = self._is_over(info) | (_numbers(info, "steps") >= most)
+        return np.asarray(is_cut & ~self.compute_terminated(achieved_goal, desired_goal, info))
+
+    def _is_over(self, info: Infos) -> NDArray[np.bool_]:
+        return _numbers(info, "time") >= self.simulation.settings["horizon"][0]
 
 
 class WaypointGoalEnv(GoalRules, WalkerEnv):

@@ -1,4 +1,4 @@
-"""Hindsight experience replay on ``LeanYaw/WaypointGoal-v0`` with Stable-Baselines3: what its own parts leave out.
+"""Hindsight experience replay on ``LeanYaw/WaypointGoal-v1`` with Stable-Baselines3: what its own parts leave out.
 
 - ``HindsightReplay`` is SB3's ``HerReplayBuffer`` that gives a relabelled step not only a new reward but also a new end. Reaching the goal
   ends an episode. SB3 keeps the end of the original goal (its issue 627), so that values of relabelled steps count rewards after the goal;

@@ -71,7 +71,7 @@ _STEP_FIELDS = (
 )  # fmt: skip
 _COMMON = (_of_walker("side", "stance_side"), *map(_of_walker, _STEP_FIELDS))
 _PUSH = tuple(_of_walker(name, condition="; with pushes") for name in ("pitch_push", "ankle_push"))
-_BODY = tuple(_of_walker(name, condition="; with random bodies") for name in BODY_NAMES)
+_BODY = tuple(_of_walker(name, condition="; with random bodies or slopes") for name in BODY_NAMES)
 _HEADING = Info("commanded_heading", "", "rad", "of tasks that command one")
 _STATE = "section state (5,), not mirrored, after the push if there is one"
 _FOOTPRINT = "contact reference point of the stance foot (2,): downhill, right, from the start"

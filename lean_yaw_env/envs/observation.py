@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from lean_yaw_env.envs.formulas import wrapped
+from lean_yaw_env.envs.state import BODY_SIZE
 from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.kernel.random import normal
 from lean_yaw_env.parameters import STATE_FIELDS
@@ -50,6 +51,16 @@ def mirror_sign(walker: Any, settings: Any) -> Any:
 def limited(value: Any) -> Any:
     """A number of an observation, within its limits, in single precision."""
     return np.float32(min(max(value, -OBSERVATION_LIMIT), OBSERVATION_LIMIT))
+
+
+@formula
+def show_body(observation: Any, column: int, walker: Any, settings: Any) -> None:
+    """Append the walker's body to an observation from ``column`` on, if the options say so."""
+    if settings.show_body != 0:
+        body = (walker.hip_width, walker.foot_radius, walker.ankle_tilt, walker.slope)
+        for k in range(BODY_SIZE):
+            shown = (body[k] - settings.body_centre[k]) / settings.body_reach[k]
+            observation[column + k] = limited(shown)
 
 
 @formula

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Any, TypeVar
 
 import numpy as np
 from gymnasium import spaces
@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from lean_yaw_env.analysis import find_gait
 from lean_yaw_env.envs.dynamics import ANKLE_PUSH, PITCH_PUSH
 from lean_yaw_env.envs.observation import COMMON_NAMES, OBSERVATION_LIMIT, STANCE_FOOT
-from lean_yaw_env.envs.reset import BODY_DEVIATIONS, HELD_OUT_REACH, BodyDraw
+from lean_yaw_env.envs.reset import HELD_OUT_REACH
 from lean_yaw_env.envs.state import BODY_NAMES, SETTINGS, Records
 from lean_yaw_env.envs.tasks import Task
-from lean_yaw_env.envs.tasks.task import TASK_RANGES
+from lean_yaw_env.envs.tasks.task import BODY_DRAWS, TASK_RANGES, RandomBody
 from lean_yaw_env.parameters import (
     INTER_LEG_ANGLE,
     PARAMETER_NAMES,
@@ -35,12 +35,6 @@ from lean_yaw_env.validation import (
 )
 from lean_yaw_env.walker import Walker
 
-RandomBody = Literal["training", "held-out"]
-_BODY_DRAWS: dict[str | None, BodyDraw] = {
-    None: BodyDraw.NOMINAL,
-    "training": BodyDraw.TRAINING,
-    "held-out": BodyDraw.HELD_OUT,
-}
 _RANGES = (
     Range("inter_leg_angle_range", 0.0, INTER_LEG_ANGLE, "[)"),
     Range("mass_offset_range", 0.0, 1.0),
@@ -52,13 +46,14 @@ _OPTIONAL_RANGES = (
     *(limits for limits in PARAMETER_RANGES if limits.name in ("slope", "friction_limit")),
 )
 _NO_LIMIT = 2**62  # steps
+_Value = TypeVar("_Value")
 
 
 @dataclass(frozen=True)
 class EnvOptions:
     """An environment's constructor arguments, the same for one walker and for many.
 
-    No option changes the shape of actions. None but ``mirror`` changes the shape of observations: ``mirror=False`` adds the stance foot.
+    No option changes the shape of actions. Two change the shape of observations: ``mirror=False`` adds the stance foot, ``show_body`` the body.
 
     Parameters
     ----------
@@ -85,12 +80,14 @@ class EnvOptions:
         Standard deviation of noise on every number observed but the stance foot, in units of the observation.
     action_delay : bool
         A step is walked by the action given one step before, the first by the gait's own command.
-    hidden_rates : bool
-        Show both rates as zero.
-    random_body : None, "training" or "held-out"
-        Draw hip width, foot radius, ankle tilt and slope anew for each episode, uniformly within ``reset.BODY_DEVIATIONS`` of the
+    hidden_rates : bool, optional
+        Show both rates as zero. The task's default otherwise, mostly False.
+    random_body : "nominal", "training" or "held-out", optional
+        Draw hip width, foot radius, ankle tilt and slope anew for each episode, uniformly within the task's ``body_reach`` of the
         parameters' for training, or outside that box but within one 1.5 times as large. The start is near the parameters' own gait. ``info``
-        contains the body, the observation does not.
+        contains the body, the observation does not. The task's default otherwise, mostly "nominal": the parameters' own body.
+    show_body : bool
+        Append hip width, foot radius, ankle tilt and slope to the observation: each less the parameters', divided by the task's ``body_reach``.
     push_level : [0, 10], optional
         Scales random impulses on both rates after every step; 1 is 0.08 on the pitch rate and 0.15 on the ankle rate (standard
         deviations). The observation, and the state in ``info``, are those after the push. The task's default otherwise, mostly 0.
@@ -112,8 +109,9 @@ class EnvOptions:
     friction_limit: float | None = None
     sensor_noise: float = 0.0
     action_delay: bool = False
-    hidden_rates: bool = False
+    hidden_rates: bool | None = None
     random_body: RandomBody | None = None
+    show_body: bool = False
     push_level: float | None = None
 
     def __post_init__(self) -> None:
@@ -121,10 +119,12 @@ class EnvOptions:
         given = [limits for limits in _OPTIONAL_RANGES if getattr(self, limits.name) is not None]
         for limits in (*_RANGES, *given):
             limits.require(getattr(self, limits.name))
-        for name in ("mirror", "action_delay", "hidden_rates"):
+        for name in ("mirror", "action_delay", "show_body"):
             require_flag(name, getattr(self, name))
+        if self.hidden_rates is not None:
+            require_flag("hidden_rates", self.hidden_rates)
         if self.random_body is not None:
-            require_choice("random_body", self.random_body, ("training", "held-out"))
+            require_choice("random_body", self.random_body, BODY_DRAWS)
 
     @classmethod
     def of(cls, arguments: Mapping[str, Any]) -> EnvOptions:
@@ -149,6 +149,8 @@ class EnvOptions:
             max_offset_change=_given(self.max_offset_change, task.max_offset_change),
             horizon=_given(self.horizon, task.horizon),
             push_level=_given(self.push_level, task.push_level),
+            hidden_rates=_given(self.hidden_rates, task.hidden_rates),
+            random_body=_given(self.random_body, task.random_body),
         )
 
     def walker_parameters(self, task: Task) -> WalkerParameters:
@@ -159,7 +161,8 @@ class EnvOptions:
         """What each number of an observation is."""
         common = COMMON_NAMES[:STANCE_FOOT] if self.mirror else COMMON_NAMES
         own = require_instance("task", task, Task).observed
-        return (*common, *(feature.name for feature in own))
+        body = BODY_NAMES if self.show_body else ()
+        return (*common, *(feature.name for feature in own), *body)
 
     def observation_space(self, task: Task) -> spaces.Space[NDArray[np.float32]]:
         """A box as large as ``observation_names``."""
@@ -176,6 +179,8 @@ class TaskOptions:
     max_offset_change: float
     horizon: float
     push_level: float
+    hidden_rates: bool
+    random_body: RandomBody
 
 
 def settings_of(
@@ -195,7 +200,7 @@ def settings_of(
     record["inter_leg_angle"] = INTER_LEG_ANGLE
     for name in (
         "inter_leg_angle_range", "mass_offset_range", "mirror", "action_delay", "sensor_noise",
-        "hidden_rates", "start_disturbance",
+        "start_disturbance", "show_body",
     ):  # fmt: skip
         record[name] = getattr(options, name)
     record["max_offset_change"] = own.max_offset_change
@@ -204,10 +209,12 @@ def settings_of(
     record["hidden_heading"] = own.parameters.slope_turns
     record["pitch_push"] = own.push_level * PITCH_PUSH
     record["ankle_push"] = own.push_level * ANKLE_PUSH
-    record["random_body"] = _BODY_DRAWS[options.random_body]
-    if options.random_body is not None:
-        record["body_centre"] = _require_body_box(own.parameters)
-        record["body_reach"] = BODY_DEVIATIONS
+    record["hidden_rates"] = own.hidden_rates
+    record["random_body"] = BODY_DRAWS[own.random_body]
+    record["body_centre"] = [getattr(own.parameters, name) for name in BODY_NAMES]
+    record["body_reach"] = task.body_reach
+    if own.random_body != "nominal":
+        _require_body_box(own.parameters, task.body_reach)
     record["gait"] = gait_of(own.parameters, task.pumping)
     record["gait_offset"] = 0.0 - task.pumping
     return record
@@ -233,7 +240,7 @@ def gait_of(parameters: WalkerParameters, pumping: float = 0.0) -> tuple[float, 
     return tuple(find_gait(walker, mass_offset=offset).tolist())
 
 
-def _given(value: float | None, default: float) -> float:
+def _given(value: _Value | None, default: _Value) -> _Value:
     return default if value is None else value
 
 
@@ -250,10 +257,10 @@ def _parameters(value: Any) -> WalkerParameters | None:
     return WalkerParameters(**value)
 
 
-def _require_body_box(parameters: WalkerParameters) -> tuple[float, ...]:
-    """The middle of the random bodies, all of which must be possible."""
-    middle = tuple(float(getattr(parameters, name)) for name in BODY_NAMES)
-    for name, value, deviation in zip(BODY_NAMES, middle, BODY_DEVIATIONS, strict=True):
+def _require_body_box(parameters: WalkerParameters, reach: tuple[float, ...]) -> None:
+    """``ValueError`` unless all random bodies around these parameters are possible."""
+    for name, deviation in zip(BODY_NAMES, reach, strict=True):
+        value = getattr(parameters, name)
         for end in (value - HELD_OUT_REACH * deviation, value + HELD_OUT_REACH * deviation):
             try:
                 replace(parameters, **{name: end})
@@ -261,4 +268,3 @@ def _require_body_box(parameters: WalkerParameters) -> tuple[float, ...]:
                 raise ValueError(
                     f"random_body: {name} within {HELD_OUT_REACH * deviation:g} of {value:g} leaves its range: {error}"
                 ) from error
-    return middle

@@ -20,6 +20,7 @@ from lean_yaw_env.envs.observation import (
     corrupt,
     limited,
     mirror_sign,
+    show_body,
 )
 from lean_yaw_env.envs.tasks.task import Task
 from lean_yaw_env.kernel.compilation import borrowed, entry_point_with
@@ -50,10 +51,13 @@ CENTRES, SCALES, ODD = COMMON_CENTRES, COMMON_SCALES, COMMON_ODD
 
 
 def reward_and_ends(walker, task, settings):
-    """A step's reward, and whether it ends the episode: terminated, truncated. The reward of a fall is zero."""
+    """A step's reward, and whether it ends the episode: terminated, truncated.
+
+    The reward of a fall is zero, that of the step across the horizon the share that lies before it.
+    """
     if walker.fall != 0:
         return 0.0, True, False
-    reward = TASK_REWARD(walker, task)
+    reward = walker.share * TASK_REWARD(walker, task)
     ends = TASK_UPDATE(walker, task)
     is_late = walker.time >= settings.horizon or walker.steps >= settings.max_episode_steps
     return reward, ends, is_late and not ends
@@ -70,6 +74,7 @@ def observe(observation, walker, task, settings):
         value = sign * values[k] if ODD[k] else values[k]
         observation[column] = limited((value - CENTRES[k]) / SCALES[k])
         column += 1
+    show_body(observation, column, walker, settings)
     corrupt(observation, walker, settings)
 
 
@@ -136,6 +141,7 @@ def compiled_for(
         [field[:5] for field in task.fields],
         tables,
         [info[:2] for info in infos_of(task)],
+        task.slope_varies,
     )
     key = (template, *formulas.values(), repr(contents))
     if key not in _COMPILED:

@@ -47,14 +47,14 @@ class Footage:
     def __init__(self, simulation: Simulation, row: int = 0) -> None:
         self._simulation = simulation
         self._row = row
-        self._walker = Walker(simulation.body_parameters(row))
+        self._parameters = simulation.body_parameters(row)
         self._footprints: list[Vector] = []
         self._headings: list[float] = []
         self._feet: list[Foot] = []
         self._goal_places: list[tuple[float, float]] = []
         self._motions: list[StepMotion] = []
         pose = self._pose()
-        self._path = walker_shape(self._walker.parameters, pose).centre[None, [0, 2]]
+        self._path = walker_shape(self._parameters, pose).centre[None, [0, 2]]
         self._path_ends = [1]  # rows of the path after so many steps, as far as it is made
         self._set_down(pose)
         self._before = self._after = self._instant(pose)
@@ -65,8 +65,9 @@ class Footage:
         fall = FallCode(int(walker.fall))
         stays = fall is FallCode.SOLVER  # the walker stands where the step began
         self._before = self._after
+        slope = float(self._before.walker.slope)
         motion = StepMotion(
-            self._walker,
+            Walker(replace(self._parameters, slope=slope)),
             self._before.pose,
             inter_leg_angle=float(walker.inter_leg_angle),
             mass_offset=float(walker.commanded_offset),
@@ -98,7 +99,9 @@ class Footage:
         """When in the last step a picture is due, ``FRAMES_PER_SECOND`` in real time, as shares of the step."""
         if not self._motions:
             return [1.0]
-        end = float(self._simulation.walkers["time"][self._row])
+        walker, _ = self._simulation.records(self._row)
+        # the step across the horizon is shown to its end
+        end = float(walker.time + (1.0 - walker.share) * walker.duration)
         rate, duration = FRAMES_PER_SECOND * SECONDS_PER_TIME_UNIT, self.motion.duration
         first, last = math.floor((end - duration) * rate) + 1, math.floor(end * rate)
         return [1.0 - (end - k / rate) / duration for k in range(first, last + 1)]
@@ -141,7 +144,7 @@ class Footage:
             downhill, right = np.subtract(goals[-1], path[-1])
             wanted = math.atan2(-right, downhill)
         return Scene(
-            parameters=self._walker.parameters,
+            parameters=self._parameters,
             pose=instant.pose,
             footprints=np.array(self._footprints[: instant.footprints]),
             headings=np.array(self._headings[: instant.footprints]),

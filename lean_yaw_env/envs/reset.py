@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Any
 
-from lean_yaw_env.envs.state import BODY_SIZE
+from lean_yaw_env.envs.state import BODY_SIZE, SLOPE
 from lean_yaw_env.kernel.compilation import borrowed, entry_point, formula
 from lean_yaw_env.kernel.random import uniform
 
@@ -62,6 +62,8 @@ def start_episodes(walkers, bodies, settings, skip):
         body = bodies[i if len(bodies) > 1 else 0]
         if common.random_body != _NOMINAL:
             draw_body(body, walker, common)
+        else:
+            body[SLOPE] = common.body_centre[SLOPE]
         walker.hip_width = body[0]
         walker.foot_radius = body[1]
         walker.ankle_tilt = body[2]

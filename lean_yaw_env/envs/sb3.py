@@ -37,7 +37,7 @@ class WalkerVecEnv(VecEnv):
     ----------
     num_envs : int >= 1
     task : str or Task
-        A task's name, its environment id, or a task of your own. Observations are dictionaries for the id ``LeanYaw/WaypointGoal-v0`` only.
+        A task's name, its environment id, or a task of your own. Observations are dictionaries for the id ``LeanYaw/WaypointGoal-v1`` only.
     step_info : bool
         Fill every walker's info at every step, which costs far more than the step itself.
     threads : int >= 1

@@ -65,7 +65,7 @@ class Simulation:
     solver_failures : how many episodes have ended because the integrator failed, as ``note_failures`` counts them
     settings : record (1,), see ``state.SETTINGS_FIELDS``
     bodies : shape (n or 1, 11)
-        The walkers' constants as the kernels take them; one row for all unless bodies are random.
+        The walkers' constants as the kernels take them; one row for all unless bodies are random or slopes vary.
     actions : float32 (n, 2), of the next step
     observations : float32 (n, numbers)
     rewards : shape (n,)
@@ -82,7 +82,7 @@ class Simulation:
             require_count("max_episode_steps", max_episode_steps)
         self.parameters = options.for_task(task).parameters
         self.settings = settings_of(options, task, max_episode_steps=max_episode_steps)
-        one_each = options.random_body is not None
+        one_each = options.for_task(task).random_body != "nominal" or task.slope_varies
         self.bodies = np.tile(np.array(self.parameters.body()), (n if one_each else 1, 1))
         self.walkers: Records = np.zeros(n, WALKER)
         self.tasks: Records = np.zeros(n, task.record)
@@ -179,8 +179,8 @@ class Simulation:
         """Put walkers of another simulation of this task, those of ``rows`` (n,), in the place of these; ``observe`` shows them."""
         self.walkers[:] = other.walkers[rows]
         self.tasks[:] = other.tasks[rows]
-        if len(self.bodies) > 1:
-            self.bodies[:] = other.bodies[rows]
+        if len(self.bodies) == self.n:
+            self.bodies[:] = other.bodies[rows if len(other.bodies) > 1 else 0]
 
     def check_options(self, options: dict[str, Any]) -> dict[str, Any]:
         """Reset options as numbers, or ``ValueError``."""
@@ -226,9 +226,7 @@ class Simulation:
         self._write_outputs(*self._arguments(_STEP, skip, infos, first, last))
 
     def body_parameters(self, row: int) -> WalkerParameters:
-        """The parameters of a walker: of random bodies, its own."""
-        if self.options.random_body is None:
-            return self.parameters
+        """The parameters of a walker: its own body, and the slope under it."""
         own = {name: float(self.walkers[name][row]) for name in BODY_NAMES}
         return replace(self.parameters, **own)
 

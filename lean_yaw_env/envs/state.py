@@ -20,6 +20,8 @@ Records = NDArray[np.void]
 BODY_SIZE = 4
 BODY_NAMES = PARAMETER_NAMES[:BODY_SIZE]
 """What a random body draws."""
+SLOPE = BODY_NAMES.index("slope")
+"""The column of bodies that follows the walker's record from step to step."""
 
 
 class Field(NamedTuple):
@@ -53,20 +55,23 @@ WALKER_FIELDS = (
     Field("previous_heading", "rad", "heading of the footprint before", is_odd=True),
     Field("place_x", "leg lengths", "contact reference point of the stance foot, downhill"),
     Field("place_z", "leg lengths", "the same to the right", is_odd=True),
-    Field("time", "time units", "since the start of the episode"),
+    Field("time", "time units", "since the start of the episode, to the horizon"),
     Field("steps", "", "since the start of the episode", "i8"),
     Field(
         "distance",
         "leg lengths",
-        "sum of the steps' advances along the mean heading of their two footprints",
+        "sum of the steps' advances along the mean heading of their two footprints, to the horizon",
     ),
-    Field("work", _WORK, "sum of the steps' positive work of moving the masses"),
+    Field("work", _WORK, "sum of the steps' positive work of moving the masses, to the horizon"),
     # --- the last step
     Field("inter_leg_angle", "rad", "commanded in the last step"),
     Field("commanded_offset", "leg lengths", "commanded in the last step", is_odd=True),
     Field("effort", "", "mean square of the last action's two numbers, each within [-1, 1]"),
     Field("fall", "", "how the last step ended, a ``FallCode``; 0 if it was completed", "i8"),
     Field("duration", "time units", "of the last step"),
+    Field(
+        "share", "", "of the last step's duration, before the horizon: 1 but in the step across it"
+    ),
     Field(
         "advance",
         "leg lengths",
@@ -83,7 +88,7 @@ WALKER_FIELDS = (
     Field("ankle_push", "rad / time unit", "the last push on the ankle rate", is_odd=True),
     # --- what lasts
     *(
-        Field(name, unit, "of this walker's body")
+        Field(name, unit, "of this walker's body" if name != "slope" else "under this walker")
         for name, unit in zip(BODY_NAMES, ("leg lengths", "leg lengths", "rad", "rad"), strict=True)
     ),
     Field("pending_angle", "rad", "inter-leg angle on its way, where actions are delayed"),
@@ -110,6 +115,7 @@ SETTINGS_FIELDS = (
     Field("start_disturbance", "", "scale of the start's random deviations"),
     Field("gait", "", "section state that episodes start near, on the left foot", size=STATE_SIZE),
     Field("gait_offset", "leg lengths", "mass offset in force in that state"),
+    Field("show_body", "", "whether the body is appended to the observation", "i8"),
     Field("random_body", "", "which bodies are drawn: a ``BodyDraw``", "i8"),
     Field("body_centre", "", "middle of the box of random bodies", size=BODY_SIZE),
     Field("body_reach", "", "half-widths of that box", size=BODY_SIZE),

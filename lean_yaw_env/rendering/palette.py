@@ -37,6 +37,10 @@ VERMILION: Colour = (213, 94, 0)
 PURPLE: Colour = (204, 121, 167)
 LIGHT_GREY: Colour = (192, 192, 192)
 WINE: Colour = (136, 34, 85)
+VIOLET: Colour = (120, 0, 220)
+BROWN: Colour = (80, 60, 0)
+NAVY: Colour = (20, 40, 140)
+CRIMSON: Colour = (220, 0, 60)
 
 AGENT_COLOURS: dict[str, Colour] = {
     "random": LIGHT_GREY,
@@ -47,6 +51,10 @@ AGENT_COLOURS: dict[str, Colour] = {
     "ppo": VERMILION,
     "sac": PURPLE,
     "apg": BLUE,
+    "tqc": VIOLET,
+    "frames": BROWN,
+    "recurrent": NAVY,
+    "oracle": CRIMSON,
     "her": WINE,
 }
 """The colour of each agent, the same in every picture."""

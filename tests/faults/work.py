@@ -20,7 +20,7 @@ from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.paper import reproduce, write_report
 
 SHORT = EnvOptions(horizon=15.0)
-HEADING = "LeanYaw/Heading-v0"
+HEADING = "LeanYaw/Heading-v1"
 SETTINGS: dict[str, Any] = {
     "ppo": PPOSettings(steps=4096, walkers=8, steps_per_update=32, batch_size=128, hidden=(8, 8)),
     "sac": SACSettings(steps=640, walkers=8, gradient_steps=1, batch_size=32, buffer_size=400, random_steps=64, hidden=(8, 6)),

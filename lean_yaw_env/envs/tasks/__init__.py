@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
-from lean_yaw_env.envs.tasks.headings import HEADING, LEVEL, SPEED_HEADING, UTURN
+from lean_yaw_env.envs.tasks.energy import ENERGY
+from lean_yaw_env.envs.tasks.headings import (
+    HEADING,
+    LEVEL,
+    LEVEL_UPHILL,
+    SPEED_HEADING,
+    UNKNOWN_BODY,
+    UTURN,
+)
+from lean_yaw_env.envs.tasks.hills import HILLS
+from lean_yaw_env.envs.tasks.race import RACE
 from lean_yaw_env.envs.tasks.slalom import SLALOM
 from lean_yaw_env.envs.tasks.task import Command, Feature, Formula, Metric, Task
-from lean_yaw_env.envs.tasks.walking import PUSH, WALK
+from lean_yaw_env.envs.tasks.walking import METASTABLE, WALK
 from lean_yaw_env.envs.tasks.waypoints import WAYPOINT, WAYPOINT_GOAL
 from lean_yaw_env.registration import name_of_task, register_id
 from lean_yaw_env.validation import require_instance, suggestion
 
-TASKS = {
-    task.name: task
-    for task in (HEADING, WALK, SPEED_HEADING, WAYPOINT, SLALOM, PUSH, UTURN, LEVEL, WAYPOINT_GOAL)
-}
+_ALL = (
+    HEADING, WALK, SPEED_HEADING, WAYPOINT, SLALOM, METASTABLE, UTURN, LEVEL, LEVEL_UPHILL, ENERGY,
+    UNKNOWN_BODY, RACE, HILLS, WAYPOINT_GOAL,
+)  # fmt: skip
+TASKS = {task.name: task for task in _ALL}
 """Those of this package and of others (``register_task``)."""
 
 
 def task_named(task: str | Task) -> Task:
-    """The task of a name ("Heading") or an environment id ("LeanYaw/Heading-v0"); a task is returned as it is.
+    """The task of a name ("Heading") or an environment id ("LeanYaw/Heading-v1"); a task is returned as it is.
 
     Raises
     ------

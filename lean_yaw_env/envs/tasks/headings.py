@@ -6,17 +6,25 @@ from dataclasses import replace
 from math import pi
 from typing import Any
 
-import numpy as np
-
-from lean_yaw_env.envs.formulas import closeness, mean_heading, positive, wrapped
+from lean_yaw_env.envs.formulas import closeness, counted_time, mean_heading, positive, wrapped
+from lean_yaw_env.envs.reset import BODY_DEVIATIONS
 from lean_yaw_env.envs.state import Field
-from lean_yaw_env.envs.tasks.task import Command, Feature, Metric, Task
+from lean_yaw_env.envs.tasks.task import (
+    FIRST,
+    FRICTION_LIMIT,
+    NEW,
+    SINCE_VERSION_1,
+    Command,
+    Feature,
+    Metric,
+    Task,
+)
 from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.kernel.random import uniform
 from lean_yaw_env.parameters import WalkerParameters
 
 LARGEST_SLOPE_COMMAND = 0.6  # rad: what the slope gives energy enough for, at a gentle pace
-SHORTEST_COMMAND, LONGEST_COMMAND = 40, 79  # steps until the next command
+SHORTEST_COMMAND, LONGEST_COMMAND = 29, 58  # time units from one command to the next
 SETTLED = 0.1  # rad
 ERROR_SCALE = 0.6  # rad, of the observed error
 
@@ -32,7 +40,7 @@ def heading_fields(largest_command: float) -> tuple[Field, ...]:
     """The record of a task that commands headings up to so many rad either side of downhill."""
     return (
         Field("command", "rad", "commanded heading", is_odd=True),
-        Field("steps_left", "", "steps that the command still stands", "i8"),
+        Field("command_left", "time units", "until the next command is due"),
         Field("error_sum", "rad * time units", "absolute heading error times duration"),
         Field("settled_sum", "time units", f"time with an error below {SETTLED}"),
         Field("settling_sum", "time units", "from each new command until first settled"),
@@ -52,9 +60,9 @@ def heading_error(walker: Any, task: Any) -> Any:
 
 @formula
 def new_heading(walker: Any, task: Any) -> None:
-    """Draw a heading and how many steps it stands."""
+    """Draw a heading and when the next one is due. When commands are due does not depend on the steps."""
     task.command = uniform(walker, -task.largest_command, task.largest_command)
-    task.steps_left = int(np.floor(uniform(walker, SHORTEST_COMMAND, LONGEST_COMMAND + 1.0)))
+    task.command_left += uniform(walker, SHORTEST_COMMAND, LONGEST_COMMAND)
     task.since_command = 0.0
     task.is_settled = 0
     task.commands += 1
@@ -62,18 +70,19 @@ def new_heading(walker: Any, task: Any) -> None:
 
 @formula
 def follow_heading(walker: Any, task: Any) -> bool:
-    """Add a step's heading error to the sums; return whether the step was the command's last."""
+    """Add a step's heading error to the sums; return whether the next command is due, at this heel strike or before."""
     error = abs(heading_error(walker, task))
-    task.error_sum += error * walker.duration
-    task.since_command += walker.duration
+    time = counted_time(walker)
+    task.error_sum += error * time
+    task.since_command += time
     if error < SETTLED:
-        task.settled_sum += walker.duration
+        task.settled_sum += time
         if task.is_settled == 0:
             task.is_settled = 1
             task.settled_commands += 1
             task.settling_sum += task.since_command
-    task.steps_left -= 1
-    return task.steps_left <= 0
+    task.command_left -= walker.duration
+    return task.command_left <= 0.0
 
 
 @formula
@@ -127,19 +136,23 @@ HEADING = Task(
         "commands": Metric("commands", None, "headings commanded so far"),
     },
     summary=f"Walk where you are told: a heading within {LARGEST_SLOPE_COMMAND} rad of downhill, commanded anew every "
-    f"{SHORTEST_COMMAND} to {LONGEST_COMMAND} steps. The entry level.",
+    f"{SHORTEST_COMMAND} to {LONGEST_COMMAND} units of time. The entry level.",
     reward_text=f"{WALKING_RATE} + {TRACKING_RATE} / (1 + (heading error / {TRACKING_WIDTH})^2) - {EFFORT_RATE} effort",
+    history=(FIRST, f"1: commands last a time, not a number of steps; {SINCE_VERSION_1}."),
     commands={"command": Command(("command",), -pi, pi, "heading, rad")},
     heading_field="command",
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
 )
 
 UTURN = replace(
     HEADING,
     name="UTurn",
     fields=heading_fields(pi),
-    summary=f"Walk where you are told, all round: any heading, commanded anew every {SHORTEST_COMMAND} to {LONGEST_COMMAND} steps. Across "
-    "the slope it gives no energy, and uphill it takes some; the masses may be moved as fast as in Level, to pump. An open challenge.",
+    summary=f"Walk where you are told, all round: any heading, commanded anew every {SHORTEST_COMMAND} to {LONGEST_COMMAND} units of time, "
+    "under pushes. Across the slope it gives no energy, and uphill it takes some; the masses may be moved as fast as in Level, to pump.",
+    history=(*HEADING.history[:-1], f"{HEADING.history[-1][:-1]}; pushes at level 0.2."),
     max_offset_change=0.1,
+    push_level=0.2,
 )
 
 # On a slope of 0.01 the gait walks at 0.68 with an inter-leg angle of 0.15 and at 0.25 with one of 0.45; 0.6 rad off downhill at 0.60
@@ -175,7 +188,7 @@ def speed_reward(walker: Any, task: Any) -> Any:
 @formula
 def speed_update(walker: Any, task: Any) -> bool:
     runs_out = follow_heading(walker, task)
-    task.speed_error_sum += abs(speed_error(walker, task)) * walker.duration
+    task.speed_error_sum += abs(speed_error(walker, task)) * counted_time(walker)
     if runs_out:
         new_heading_and_speed(walker, task)
     return False
@@ -216,7 +229,7 @@ SPEED_HEADING = replace(
         "commanded_speed": Metric("commanded_speed", None, "in force"),
     },
     summary=f"Walk where and as fast as you are told: a heading within {LARGEST_SLOPE_COMMAND} rad of downhill and a speed from "
-    f"{LEAST_SPEED:.2f} to {GREATEST_SPEED:.2f}, commanded anew together every {SHORTEST_COMMAND} to {LONGEST_COMMAND} steps.",
+    f"{LEAST_SPEED:.2f} to {GREATEST_SPEED:.2f}, commanded anew together every {SHORTEST_COMMAND} to {LONGEST_COMMAND} units of time.",
     reward_text=f"{WALKING_RATE} + {EACH_TRACKING_RATE} / (1 + (heading error / {TRACKING_WIDTH})^2) + {EACH_TRACKING_RATE} / (1 + (speed "
     f"error / {SPEED_WIDTH})^2) - {EFFORT_RATE} effort",
     commands={
@@ -257,12 +270,35 @@ LEVEL = replace(
             "lower",
         ),
     },
-    summary="Walk on a level floor, or up a gentle slope (`slope=-0.005`), powered by nothing but moving the masses from side to side, and "
-    f"steer: a heading within {LARGEST_SLOPE_COMMAND} rad, commanded anew every {SHORTEST_COMMAND} to {LONGEST_COMMAND} steps. Episodes "
+    summary="Walk on a level floor, powered by nothing but moving the masses from side to side, and "
+    f"steer: a heading within {LARGEST_SLOPE_COMMAND} rad, commanded anew every {SHORTEST_COMMAND} to {LONGEST_COMMAND} units of time. Episodes "
     f"start near the gait of offsets of {PUMPING} away from the stance foot.",
     reward_text=f"{WALKING_RATE} + {LEVEL_TRACKING_RATE} / (1 + (heading error / {TRACKING_WIDTH})^2) + {PROGRESS} speed - {WORK_PRICE:g} "
     "(power put into moving the masses)",
-    parameters=WalkerParameters(slope=0.0),
+    parameters=WalkerParameters(slope=0.0, friction_limit=FRICTION_LIMIT),
     max_offset_change=0.1,
     pumping=PUMPING,
+)
+
+UPHILL = -0.01
+
+LEVEL_UPHILL = replace(
+    LEVEL,
+    name="LevelUphill",
+    summary=f"Level on a floor that rises: walk up a slope of {-UPHILL} rad, powered by nothing but moving the masses from side to side, and "
+    f"steer as in Level, either side of straight up the slope.",
+    history=NEW,
+    parameters=WalkerParameters(slope=UPHILL, friction_limit=FRICTION_LIMIT),
+)
+
+UNKNOWN_BODY = replace(
+    HEADING,
+    name="UnknownBody",
+    summary="Heading with a body that you do not know: drawn anew for each episode from a box twice as wide as that of other tasks, and with both "
+    "rates hidden. It must be learned from how the walker moves, in memory of past observations; an oracle sees it (`show_body=True`).",
+    history=NEW,
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
+    hidden_rates=True,
+    random_body="training",
+    body_reach=tuple(2.0 * reach for reach in BODY_DEVIATIONS),
 )

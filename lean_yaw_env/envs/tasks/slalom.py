@@ -7,12 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from lean_yaw_env.envs.formulas import mean_heading, place, wrapped
+from lean_yaw_env.envs.formulas import counted_time, mean_heading, place, wrapped
 from lean_yaw_env.envs.state import Field
-from lean_yaw_env.envs.tasks.task import Feature, Metric, Task
+from lean_yaw_env.envs.tasks.task import (
+    FIRST,
+    FRICTION_LIMIT,
+    SINCE_VERSION_1,
+    Feature,
+    Metric,
+    Task,
+)
 from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.kernel.random import uniform
-from lean_yaw_env.parameters import Vector
+from lean_yaw_env.parameters import Vector, WalkerParameters
 
 # The path: the sum of height (1 - cos(wave number x)) to the right, x downhill. It starts where the walker does, straight downhill.
 WAVES = 3
@@ -100,7 +107,7 @@ def reward(walker: Any, task: Any) -> Any:
 def update(walker: Any, task: Any) -> bool:
     error = cross_track_error(walker, task)
     task.cross_track_error = error
-    task.square_sum += error * error * walker.duration
+    task.square_sum += error * error * counted_time(walker)
     if walker.time > 0.0:
         task.root_mean_square = np.sqrt(task.square_sum / walker.time)
     return abs(error) > LARGEST_ERROR
@@ -175,7 +182,9 @@ SLALOM = Task(
     summary=f"Follow a path downhill, the sum of {WAVES} waves of random length ({SHORTEST_WAVE:g} to {LONGEST_WAVE:g} leg lengths), with "
     f"slopes to {GREATEST_SLOPE} and curvature to {GREATEST_CURVATURE}, under pushes.",
     reward_text=f"{WALKING_RATE} + {TRACKING_RATE} / (1 + (cross-track error / {TRACKING_WIDTH})^2) - {EFFORT_RATE} effort",
+    history=(FIRST, f"1: the push level is 0.4 in place of 0.2; {SINCE_VERSION_1}."),
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
     ends=f"a cross-track error beyond {LARGEST_ERROR:g}, as a termination without reward",
     reference_path=reference_path,
-    push_level=0.2,
+    push_level=0.4,
 )

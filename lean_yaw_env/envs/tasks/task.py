@@ -10,11 +10,24 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from lean_yaw_env.envs.state import WALKER_FIELDS, Field, Records, record_type
+from lean_yaw_env.envs.reset import BODY_DEVIATIONS, BodyDraw
+from lean_yaw_env.envs.state import BODY_SIZE, WALKER_FIELDS, Field, Records, record_type
 from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.parameters import Range, Vector, WalkerParameters
-from lean_yaw_env.validation import require_instance, require_mapping
+from lean_yaw_env.validation import (
+    require_array,
+    require_choice,
+    require_flag,
+    require_instance,
+    require_mapping,
+)
 
+RandomBody = Literal["nominal", "training", "held-out"]
+BODY_DRAWS: dict[RandomBody, BodyDraw] = {
+    "nominal": BodyDraw.NOMINAL,
+    "training": BodyDraw.TRAINING,
+    "held-out": BodyDraw.HELD_OUT,
+}
 Formula = Callable[[Any, Any], Any]
 """Of a walker's record and the task's; decorated by ``formula``."""
 
@@ -40,6 +53,14 @@ def observe_nothing(walker: Any, task: Any) -> Any:
     """The features of a task that has none."""
     return ()
 
+
+FIRST = "0: the first."
+FRICTION_LIMIT = 0.6
+"""Friction limit of the tasks of this package: the least that tables give for rubber on dry concrete, 0.6 to 0.85."""
+SINCE_VERSION_1 = f"the friction limit is {FRICTION_LIMIT}; the step across the horizon is paid, and counted in metrics, to the horizon alone"
+"""What version 1 changed in every task of the package."""
+NEW = ("1: the first.",)
+"""The history of a task that came with version 1."""
 
 TASK_RANGES = (
     Range("horizon", 0.0, math.inf, "(]"),
@@ -104,14 +125,14 @@ class Task:
     name: str
     """The middle of its environment id."""
     reward: Formula
-    """Of a step that was no fall, from records after the step and before ``update``."""
+    """Of a step that was no fall, from records after the step and before ``update``. The environment pays its ``share`` before the horizon."""
     metrics: dict[str, Metric]
     """Success metrics, apart from reward."""
     summary: str
     """For the documents: what the walker must do."""
     reward_text: str
     """For the documents: the reward's rate per unit of time."""
-    history: tuple[str, ...] = ("0: the first.",)
+    history: tuple[str, ...] = (FIRST,)
     """For the documents: a sentence for each version."""
     fields: tuple[Field, ...] = ()
     """The task's record, each field at its initial value before ``start``."""
@@ -140,10 +161,18 @@ class Task:
     horizon: float = 200.0
     max_offset_change: float = 0.005
     push_level: float = 0.0
+    hidden_rates: bool = False
+    random_body: RandomBody = "nominal"
+    body_reach: tuple[float, ...] = BODY_DEVIATIONS
+    """Half-widths of the box from which random bodies are drawn, shape (4,)."""
+    slope_varies: bool = False
+    """The slope under a walker changes from step to step: ``refresh`` sets its field ``slope``, on which it walks the next step."""
     pumping: float = 0.0
     """Episodes start in the gait driven by this offset, away from the stance foot; 0 is the gait that the slope drives."""
     headline: str = "return"
     """The metric, or "return", by which agents are compared: it must be meaningful without survival."""
+    is_ranked: bool = True
+    """Whether agents are compared on it; False for a smoke test."""
 
     def __post_init__(self) -> None:
         for name in ("metrics", "commands"):
@@ -155,6 +184,10 @@ class Task:
         require_instance("parameters", self.parameters, WalkerParameters)
         for limits in (*TASK_RANGES, _PUMPING, _GOAL_RADIUS):
             limits.require(getattr(self, limits.name))
+        for name in ("hidden_rates", "slope_varies", "is_ranked"):
+            require_flag(name, getattr(self, name))
+        require_choice("random_body", self.random_body, BODY_DRAWS)
+        require_array("body_reach", self.body_reach, (BODY_SIZE,), 0.0, 1.0, "(]")
         common = {field.name for field in WALKER_FIELDS}
         own = {field.name for field in self.fields}
         if common & own:

@@ -1,4 +1,4 @@
-"""Walk and Push: keep walking; and keep walking while you are pushed after every step."""
+"""Walk and Metastable: keep walking; and keep walking as long as you can while you are pushed after every step."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ from dataclasses import replace
 from typing import Any
 
 from lean_yaw_env.envs.dynamics import ANKLE_PUSH, PITCH_PUSH
-from lean_yaw_env.envs.state import Field
-from lean_yaw_env.envs.tasks.task import Metric, Task
+from lean_yaw_env.envs.tasks.task import FIRST, FRICTION_LIMIT, SINCE_VERSION_1, Metric, Task
 from lean_yaw_env.kernel.compilation import formula
+from lean_yaw_env.parameters import WalkerParameters
 
 # Reward per unit of time: for walking, and against large actions.
 WALKING_RATE = 1.0
 EFFORT_RATE = 0.05
-TRIAL = 200  # steps
 
 
 @formula
@@ -29,31 +28,26 @@ WALK = Task(
         "time_walked": Metric("time", None, "units of time", "higher"),
         "distance": Metric("distance", None, "leg lengths, along the headings", "higher"),
     },
-    summary="Keep walking; nothing is commanded.",
+    summary="Keep walking; nothing is commanded. A smoke test, which ranks nobody.",
     reward_text=f"{WALKING_RATE} - {EFFORT_RATE} effort",
+    history=(FIRST, f"1: {SINCE_VERSION_1}."),
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
+    is_ranked=False,
 )
 
 
-@formula
-def note_survival(walker: Any, task: Any) -> bool:
-    if walker.steps >= TRIAL:
-        task.survived = 1
-    return False
-
-
-PUSH = replace(
+METASTABLE = replace(
     WALK,
-    name="Push",
-    fields=(Field("survived", "", f"whether the walker has made {TRIAL} steps", "i8"),),
-    update=note_survival,
-    metrics={
-        "survived_200_steps": Metric("survived", None, f"1 from step {TRIAL} on", "higher", True),
-        "time_walked": WALK.metrics["time_walked"],
-    },
-    summary="Stay on your feet: after every step both rates get a random impulse, which the next observation shows as part of the rates. "
-    f"At push_level = 1 the standard deviations are {PITCH_PUSH} on the pitch rate and {ANKLE_PUSH} on the ankle rate.",
-    horizon=300.0,
+    name="Metastable",
+    metrics={"time_walked": WALK.metrics["time_walked"]},
+    summary="Stay on your feet under pushes that never stop: after every step both rates get a random impulse, which the next observation shows "
+    f"as part of the rates. At push_level = 1 the standard deviations are {PITCH_PUSH} on the pitch rate and {ANKLE_PUSH} on the ankle rate. "
+    "Every walker falls in the end: its score is the mean time to a fall, all simulated time over the number of falls.",
+    history=("1: in place of Push, which asked for 200 steps under weaker pushes.",),
+    parameters=WalkerParameters(friction_limit=FRICTION_LIMIT),
+    horizon=20_000.0,
     max_offset_change=0.1,  # a small one would limit how hard a push can be met
-    push_level=0.5,
-    headline="survived_200_steps",
+    push_level=0.8,
+    headline="time_per_fall",
+    is_ranked=True,
 )

@@ -8,14 +8,24 @@ from typing import Any
 
 import numpy as np
 
-from lean_yaw_env.envs.formulas import direction, mean_heading, place
+from lean_yaw_env.envs.formulas import direction, ends_in_time, mean_heading, place
 from lean_yaw_env.envs.state import Field
-from lean_yaw_env.envs.tasks.task import Command, Feature, Metric, Task
+from lean_yaw_env.envs.tasks.task import (
+    FIRST,
+    FRICTION_LIMIT,
+    SINCE_VERSION_1,
+    Command,
+    Feature,
+    Metric,
+    Task,
+)
 from lean_yaw_env.kernel.compilation import formula
 from lean_yaw_env.kernel.random import uniform
 from lean_yaw_env.parameters import WalkerParameters
 
-NEAREST, FARTHEST = 8.0, 16.0  # leg lengths, from where the last goal was reached
+# Leg lengths from where the last goal was reached. Waypoint's are near enough to need tight turns, WaypointGoal's one far enough for wide ones.
+NEAREST, FARTHEST = 4.0, 8.0
+GOAL_NEAREST, GOAL_FARTHEST = 8.0, 16.0
 RADIUS = 0.5
 BEARING_SCALE = 0.6  # rad
 DISTANCE_SCALE = 8.0
@@ -43,6 +53,12 @@ def goal_distance(walker: Any, task: Any) -> Any:
 
 
 @formula
+def is_reached(walker: Any, task: Any) -> bool:
+    """Whether the last step came to the goal, before the horizon."""
+    return ends_in_time(walker) and goal_distance(walker, task).real <= RADIUS
+
+
+@formula
 def goal_bearing(walker: Any, task: Any) -> Any:
     """How far the goal is to the left of straight ahead, rad."""
     x, z = to_goal(walker, task)
@@ -56,7 +72,7 @@ def goal_bearing(walker: Any, task: Any) -> Any:
 @formula
 def start(walker: Any, task: Any) -> None:
     """Draw a place around the walker."""
-    distance = uniform(walker, NEAREST, FARTHEST)
+    distance = uniform(walker, task.nearest, task.farthest)
     bearing = uniform(walker, -pi, pi)
     x, z = place(walker)
     task.goal_x = x + distance * np.cos(bearing)
@@ -72,7 +88,7 @@ def reward(walker: Any, task: Any) -> Any:
 
 @formula
 def update(walker: Any, task: Any) -> bool:
-    if goal_distance(walker, task) <= RADIUS:
+    if is_reached(walker, task):
         task.goals += 1
         start(walker, task)
     return False
@@ -88,11 +104,20 @@ def features(walker: Any, task: Any) -> Any:
     return goal_bearing(walker, task), goal_distance(walker, task)
 
 
+def goal_fields(nearest: float, farthest: float) -> tuple[Field, ...]:
+    """The fields of a goal and of how far goals are set."""
+    return (
+        Field("goal_x", "leg lengths", "downhill"),
+        Field("goal_z", "leg lengths", "to the right", is_odd=True),
+        Field("nearest", "leg lengths", "that a goal is set", initial=nearest),
+        Field("farthest", "leg lengths", "that a goal is set", initial=farthest),
+    )
+
+
 WAYPOINT = Task(
     name="Waypoint",
     fields=(
-        Field("goal_x", "leg lengths", "downhill"),
-        Field("goal_z", "leg lengths", "to the right", is_odd=True),
+        *goal_fields(NEAREST, FARTHEST),
         Field("goal_distance", "leg lengths", "to the goal in force", is_followed=True),
         Field("goals", "", "reached so far", "i8"),
     ),
@@ -120,6 +145,11 @@ WAYPOINT = Task(
     "held, 0.05, the walker turns on a radius of 8.2 at the inter-leg angle of 0.3, of 38 at 0.15, 4.1 at 0.36 and 2.3 at 0.39; at 0.42 it "
     "trips.",
     reward_text=f"{WALKING_RATE} + {APPROACH:g} (speed of approach to the goal) - {EFFORT_RATE} effort",
+    history=(
+        FIRST,
+        f"1: goals are {NEAREST:g} to {FARTHEST:g} apart in place of {GOAL_NEAREST:g} to {GOAL_FARTHEST:g}; one reached after the horizon does "
+        f"not count; {SINCE_VERSION_1}.",
+    ),
     commands={
         "goal": Command(
             ("goal_x", "goal_z"), -FARTHEST_COMMAND, FARTHEST_COMMAND, "place of the first goal"
@@ -127,7 +157,7 @@ WAYPOINT = Task(
     },
     goal_fields=("goal_x", "goal_z"),
     goal_radius=RADIUS,
-    parameters=WalkerParameters(slope_turns=True),
+    parameters=WalkerParameters(slope_turns=True, friction_limit=FRICTION_LIMIT),
     horizon=300.0,
     headline="goals",
 )
@@ -135,12 +165,12 @@ WAYPOINT = Task(
 
 @formula
 def goal_reward(walker: Any, task: Any) -> Any:
-    return 1.0 if goal_distance(walker, task).real <= RADIUS else 0.0
+    return 1.0 if is_reached(walker, task) else 0.0
 
 
 @formula
 def goal_update(walker: Any, task: Any) -> bool:
-    if goal_distance(walker, task) <= RADIUS:
+    if is_reached(walker, task):
         task.reached = 1
     return task.reached != 0
 
@@ -156,7 +186,7 @@ WAYPOINT_GOAL = replace(
     WAYPOINT,
     name="WaypointGoal",
     fields=(
-        *WAYPOINT.fields[:2],
+        *goal_fields(GOAL_NEAREST, GOAL_FARTHEST),
         Field("own_x", "leg lengths", "where the walker is, downhill"),
         Field("own_z", "leg lengths", "the same to the right", is_odd=True),
         Field("heading_cosine", "", "of the mean heading of the last two footprints"),
@@ -170,7 +200,7 @@ WAYPOINT_GOAL = replace(
         "is_success": Metric("reached", None, "1 once the goal is reached", "higher", True),
         "time": Metric("time", None, "when the episode ended"),
     },
-    summary="Walk to one place, as far and at any bearing as in Waypoint.",
+    summary=f"Walk to one place, {GOAL_NEAREST:g} to {GOAL_FARTHEST:g} leg lengths away at any bearing.",
     reward_text=f"none, but 1 for the step that comes within {RADIUS} of the goal",
     ends="the goal reached",
     horizon=150.0,  # enough for a half circle and the farthest goal, at the gait's speed, twice over
