@@ -184,7 +184,7 @@ def test_map_saves_and_loads_and_another_question_is_refused(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("axes", "message"),
     [
-        ({}, "one to three parameters"),
+        ({}, "one to six parameters"),
         ({"slope": [0.02, 0.01]}, "axis slope must be growing numbers"),
         ({"slope": [0.9]}, "slope must be in"),
         ({"colour": [1.0]}, "parameter must be one of"),

@@ -24,6 +24,7 @@ from lean_yaw_env.parameters import WalkerParameters
 dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")
 zarr = pytest.importorskip("zarr")
+fsspec = pytest.importorskip("fsspec")
 
 AXES = {"hip_width": np.linspace(0.1, 0.5, 12), "ankle_tilt": np.linspace(0.3, 0.8, 25)}
 WALKER = Walker(WalkerParameters())
@@ -214,3 +215,25 @@ def test_a_store_of_another_map_or_of_other_things_is_refused(tmp_path: Path) ->
     with pytest.raises(ValueError, match="another question"):
         stability_map(WALKER, {"slope": [0.01]}, path=tmp_path / "other.zarr")
     assert (tmp_path / "mine" / "letter.txt").read_text() == "dear"
+
+
+def test_a_store_may_be_in_an_object_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("s3fs")
+    server = pytest.importorskip("moto.server").ThreadedMotoServer(ip_address="127.0.0.1", port=0)
+    server.start()
+    try:
+        host, port = server.get_host_and_port()
+        options = {
+            "endpoint_url": f"http://{host}:{port}", "key": "key", "secret": "secret",
+            "client_kwargs": {"region_name": "us-east-1"},
+        }  # fmt: skip
+        monkeypatch.setitem(fsspec.config.conf, "s3", options)
+        fsspec.filesystem("s3").mkdir("maps")
+        alone = stability_map(WALKER, AXES)
+        for _ in range(2):  # the second time all is there
+            data = stability_map(WALKER, AXES, path="s3://maps/walker.zarr")
+            assert data.equals(alone)
+        with pytest.raises(ValueError, match="another question"):
+            stability_map(WALKER, PUMPING, path="s3://maps/walker.zarr")
+    finally:
+        server.stop()

@@ -1,4 +1,4 @@
-"""Maps of a walker's gait and its stability over one to three parameters, as labelled arrays."""
+"""Maps of a walker's gait and its stability over one to six parameters, as labelled arrays."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def stability_map(
     ----------
     walker : Walker, PassiveWalker or SectionMap
         Holds the parameters that are not on an axis.
-    axes : one to three names of parameters, each with its values
+    axes : one to six names of parameters, each with its values
         Names of the map's ``parameters``: ``BODY_PARAMETERS``, and for the active walker ``COMMAND_PARAMETERS``.
     path, engine, progress : see ``fill_grid``
         Called again with the same path, an interrupted map goes on where it was.
@@ -193,8 +193,8 @@ class _Grid:
     def __init__(
         self, section_map: SectionMap, axes: Mapping[str, Sequence[float] | Vector]
     ) -> None:
-        if not 1 <= len(require_mapping("axes", axes)) <= 3:
-            raise ValueError(f"axes must name one to three parameters, got {list(axes)}")
+        if not 1 <= len(require_mapping("axes", axes)) <= 6:
+            raise ValueError(f"axes must name one to six parameters, got {list(axes)}")
         for name in axes:
             section_map = section_map.along(name)
         self.section_map = section_map
@@ -287,7 +287,7 @@ def _one_by_one(
 def _at_once(
     section_map: ActiveMap, points: Mapping[str, Vector], guesses: Vector | None
 ) -> Columns:
-    grid = _walker_grid(section_map, points)
+    grid = walker_grid(section_map, points)
     if guesses is not None:
         gaits = solve_grid(grid, guesses)
         distance = np.abs(gaits.states - guesses[gaits.index]).max(axis=1, initial=0.0)
@@ -326,7 +326,7 @@ def _columns(section_map: ActiveMap, grid: WalkerGrid, gaits: GridGaits) -> Colu
     return values
 
 
-def _walker_grid(section_map: ActiveMap, points: Mapping[str, Vector]) -> WalkerGrid:
+def walker_grid(section_map: ActiveMap, points: Mapping[str, Vector]) -> WalkerGrid:
     """The walkers at some points, as arrays."""
     n = len(next(iter(points.values())))
     bodies = np.tile(np.array(section_map.walker.parameters.body()), (n, 1))

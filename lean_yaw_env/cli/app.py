@@ -88,7 +88,7 @@ def stability(
     axis: Annotated[
         list[str],
         typer.Argument(
-            help="One to three axes name=low:high:count: hip_width, foot_radius, ankle_tilt, "
+            help="One to six axes name=low:high:count: hip_width, foot_radius, ankle_tilt, "
             "slope, ankle_stiffness, ankle_damping, inter_leg_angle, mass_offset, "
             "alternating_offset."
         ),
@@ -122,6 +122,39 @@ def stability(
         lambda: records.show_grid("points", "gait", summary, rows),
         lambda: plots.map_figure(data),
     )
+
+
+@command()
+def atlas(
+    out: Annotated[str, typer.Option(help="Zarr store's folder or URL; resumes from it.")],
+    axis: Annotated[
+        list[str] | None,
+        typer.Argument(help="Other values of an axis than the atlas's: name=low:high:count."),
+    ] = None,
+    every: Annotated[
+        int, typer.Option(help="Basins at each so-many-th value of an axis only.")
+    ] = 3,
+    threads: Threads = 1,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+) -> Output:
+    """Find the gaits of ten million designs, and basins on a coarser grid: slope, inter-leg angle, foot radius, hip width, ankle tilt."""
+    from lean_yaw_env.analysis import DESIGNS, Atlas, basin_sizes, stability_map
+
+    axes, engine = {**DESIGNS, **parse_axes(axis or [])}, Engine(threads, workers, scheduler)
+    shown = _shows_progress(engine)
+    gaits = stability_map(Walker(), axes, path=f"{out}/gaits.zarr", engine=engine, progress=shown)
+    basins = basin_sizes(
+        gaits, every=every, path=f"{out}/basins.zarr", engine=engine, progress=shown
+    )
+    summary = records.grid_summary(gaits, "gait", ("speed", "greatest_friction"))
+    fastest = Atlas(gaits, basins).fastest_stable()
+
+    def show() -> None:
+        records.show_grid("designs", "gait", summary, [])
+        records.show_pairs("the fastest stable design", fastest)
+
+    return Output({**summary, "fastest_stable": fastest}, show)
 
 
 @command(draws=True)
