@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from lean_yaw_env.analysis.active_map import ActiveMap
 from lean_yaw_env.analysis.filling import Arrays, Box, Layout, fill_grid, write_box
 from lean_yaw_env.analysis.gait_map import walker_grid
-from lean_yaw_env.analysis.section_map import section_map_of
 from lean_yaw_env.analysis.storage import labelled
 from lean_yaw_env.engine import ONE_THREAD, Engine
 from lean_yaw_env.errors import NoGaitError
@@ -116,7 +116,7 @@ def _survived(designs: Mapping[str, Vector], states: Vector, n_steps: int) -> Ve
 
     off = _REACH * (2.0 * qmc.Sobol(STATE_SIZE, scramble=False).random(PUSHES) - 1.0)
     every = {name: np.repeat(values, PUSHES) for name, values in designs.items()}
-    grid = walker_grid(section_map_of(Walker()), every)
+    grid = walker_grid(ActiveMap(Walker()), every)
     current = (states[:, None] + off).reshape(-1, STATE_SIZE)
     who = np.arange(len(current))
     for k in range(n_steps):
