@@ -406,7 +406,11 @@ ROWS |= {
     "Engine": Row(
         constant(analysis.Engine),
         {},
-        {"threads": count(0, 2000), "workers": optional(count(0, 2000)), "scheduler": optional(NAME)},
+        {
+            "threads": count(0, 2000),
+            "workers": optional(count(0, 2000)),
+            "scheduler": optional(NAME),
+        },
     ),
     "continue_gait": Row(
         constant(analysis.continue_gait),
@@ -530,7 +534,13 @@ ROWS |= {
             "most_steps": 0,
         },
         {name: kind for name, kind in CAPTURE.items() if name not in ("states", "threads")}
-        | {"axes": AXES, "centre": optional(STATE), "path": optional(PATH), "engine": OBJECT, "progress": FLAG},
+        | {
+            "axes": AXES,
+            "centre": optional(STATE),
+            "path": optional(PATH),
+            "engine": OBJECT,
+            "progress": FLAG,
+        },
     ),
     "Branch.cycle": Row(lambda: branch().cycle, {}, {"index": (None, True, "3", 1.5, 1000, [1])}),
     # --- environments
