@@ -41,12 +41,14 @@ VIOLET: Colour = (120, 0, 220)
 BROWN: Colour = (80, 60, 0)
 NAVY: Colour = (20, 40, 140)
 CRIMSON: Colour = (220, 0, 60)
+OLIVE: Colour = (130, 140, 0)
 
 AGENT_COLOURS: dict[str, Colour] = {
     "random": LIGHT_GREY,
     "fixed": BLACK,
     "feedback": ORANGE,
     "lqr": SKY_BLUE,
+    "linear": OLIVE,
     "mpc": GREEN,
     "ppo": VERMILION,
     "sac": PURPLE,
