@@ -351,8 +351,8 @@ def reference(
 def robustness(
     task: Tasks = None,
     agents: Annotated[str, Option(help="Agents, separated by commas, or all.")] = ALL,
-    episodes: Annotated[int, Option(help="Episodes of each agent under each variation, for each of its trainings.")] = 200,
-    costly_episodes: Annotated[int, Option(help="Largest number of episodes for agents that plan at every step (mpc).")] = 20,
+    episodes: Annotated[int, Option(help="Episodes of each agent under each variation, for each of its trainings.")] = 100,
+    costly_episodes: Annotated[int, Option(help="Largest number of episodes for agents that plan at every step (mpc).")] = 6,
     seed: Annotated[int, Option(help="Seed of the validation episodes.")] = 0,
     agent_path: AgentPath = None,
     runs: Runs = Path("runs"),
@@ -376,7 +376,26 @@ def robustness(
     names = names_in([agents])
     candidates = evaluation.candidates(tasks_in(task or ["Heading"]), [] if ALL in names else names)
     rows = robustness_rows(candidates, evaluation)
-    typer.echo(f"written: {write_robustness(rows, out, command_as_typed())}")
+    typer.echo(f"written: {write_robustness(rows, out, command_as_typed(), evaluation)}")
+
+
+@_command("dataset")
+def dataset(
+    task: Tasks = None,
+    kind: Annotated[str, Option(help="expert, medium (the expert with noise on its actions), random or mixed; several separated by commas, or all.")] = ALL,
+    expert: Annotated[str, Option(help="The agent that the expert is.")] = "ppo",
+    episodes: Annotated[int, Option(help="Episodes of each dataset.")] = 300,
+    seed: Annotated[int, Option(help="Seed of a training: the episodes are of its environment seeds.")] = 0,
+    out: Annotated[Path, Option(help="Folder of Minari's datasets.")] = Path("datasets"),
+) -> None:  # fmt: skip
+    """Write datasets for offline reinforcement learning in Minari's format: leanyaw/TASK/KIND-v1."""
+    from .datasets import KINDS, make_dataset
+
+    kinds = names_in([kind])
+    for each in tasks_in(task or ["Heading"]):
+        for one in KINDS if ALL in kinds else kinds:
+            name = make_dataset(each, one, out, expert=expert, episodes=episodes, seed=seed)  # pyright: ignore[reportArgumentType]
+            typer.echo(f"written: {name} in {out}")
 
 
 @_command("closed-loop")
@@ -449,7 +468,7 @@ def capture(
 def film(
     task: Annotated[str, Option(help="A task's name, or all.")] = ALL,
     agent: Annotated[str, Option(help="The agent. If it was not trained for a task, lqr is filmed instead.")] = "ppo",
-    out: Annotated[Path, Option(help="Folder for <task>.gif.")] = Path("docs/videos"),
+    out: Annotated[Path, Option(help="Folder for <task>.gif.")] = Path("films"),
     seed: Annotated[int, Option(help="Another number films other episodes.")] = 0,
     seconds: Annotated[float, Option(help="Of each film.")] = 11.0,
     speed: Annotated[float, Option(help="Times real time for legs of a metre.")] = 2.0,

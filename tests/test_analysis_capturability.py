@@ -20,6 +20,7 @@ from lean_yaw_env.analysis import (
     capturability,
     capture,
     capture_map,
+    filling,
     find_limit_cycle,
     load_dataset,
     refine_capture,
@@ -151,7 +152,7 @@ def test_nothing_depends_on_how_many_are_searched_at_a_time(found, monkeypatch) 
 
 def test_an_interrupted_map_goes_on_and_holds_the_first_commands(tmp_path: Path, found, monkeypatch) -> None:  # fmt: skip
     path = tmp_path / "capture.nc"
-    monkeypatch.setattr(capturability, "_CHUNK", 50)
+    monkeypatch.setattr(filling, "_FEWEST", 50)
     search, calls = capturability.capture, []
 
     def interrupted(*given, **named):

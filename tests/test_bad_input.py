@@ -399,7 +399,17 @@ ROWS |= {
             "centre": optional(STATE),
             "n_steps": N_STEPS,
             "path": optional(PATH),
+            "engine": OBJECT,
             "progress": FLAG,
+        },
+    ),
+    "Engine": Row(
+        constant(analysis.Engine),
+        {},
+        {
+            "threads": count(0, 2000),
+            "workers": optional(count(0, 2000)),
+            "scheduler": optional(NAME),
         },
     ),
     "continue_gait": Row(
@@ -473,7 +483,7 @@ ROWS |= {
             **WALK_OF,
             "axes": AXES,
             "path": optional(PATH),
-            "threads": count(0, 2000),
+            "engine": OBJECT,
             "progress": FLAG,
         },
     ),
@@ -523,8 +533,14 @@ ROWS |= {
             "settle_steps": 1,
             "most_steps": 0,
         },
-        {name: kind for name, kind in CAPTURE.items() if name != "states"}
-        | {"axes": AXES, "centre": optional(STATE), "path": optional(PATH), "progress": FLAG},
+        {name: kind for name, kind in CAPTURE.items() if name not in ("states", "threads")}
+        | {
+            "axes": AXES,
+            "centre": optional(STATE),
+            "path": optional(PATH),
+            "engine": OBJECT,
+            "progress": FLAG,
+        },
     ),
     "Branch.cycle": Row(lambda: branch().cycle, {}, {"index": (None, True, "3", 1.5, 1000, [1])}),
     # --- environments
@@ -901,7 +917,7 @@ RESULTS = {
     "Agent", "BatchResult", "BicycleMotion", "Branch", "CanonicalMatrices", "CharacteristicPolynomial", "ClosedLoopMap", "Command",
     "ContactForces", "ControlInterface", "Disturbance", "DoubleRoot", "EigenvalueBranches", "EnergyLedger", "Event", "Fall", "FallCode",
     "Feature", "FellError", "Field", "FloorDemand", "ForceExtremes", "Goal", "HindsightReplay", "LargestPushes", "LeanEquation",
-    "LeanYawError", "LegShape", "LimitCycle", "Metric", "Mode", "MultibodyStep", "NoGaitError", "PassiveGait", "PassiveStep",
+    "ClusterError", "LeanYawError", "LegShape", "LimitCycle", "Metric", "Mode", "MultibodyStep", "NoGaitError", "PassiveGait", "PassiveStep",
     "PassiveWalk", "Policy", "PolicyCard", "PolicyFileError", "Capture", "SectionMap", "SkateboardMotion", "SolverError",
     "SpeedRange", "StepDemand", "StepResult", "Table3Column", "Trajectory", "Walk", "WalkerShape",
 }  # fmt: skip
@@ -909,7 +925,7 @@ RESULTS = {
 INSIDE = {
     "fall_of", "formula", "normal", "step_passive_rows", "uniform",
     "Simulation", "CharacteristicPolynomial.derivative", "CharacteristicPolynomial.eigenvalue_rate", "ControlInterface", "ClosedLoopMap",
-    "Agent", "GoalFromWalker.forward", "Growing", "progress_bar", "require_memory", "Capture.share", "Body.ankle_rotation", "LegShape.axis_ends",
+    "Agent", "GoalFromWalker.forward", "progress_bar", "require_memory", "Capture.share", "Body.ankle_rotation", "LegShape.axis_ends",
     "RealTime.reset", "RealTime.step", "SectionMap.step_commanded", "ActiveMap.step_commanded", "Task.measure", "SectionMap.image",
     *(f"{kind}.{name}" for kind in ("SectionMap", "ActiveMap", "PassiveMap") for name in ("linear_step", "results", "step_many")),
     "SectionMap.require_state",

@@ -22,7 +22,11 @@ from lean_yaw_env.kernel.flight import (
 )
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCS = ROOT / "docs"
+PAGES = [
+    ROOT / "README.md",
+    *(page for page in sorted(DOCS.rglob("*.md")) if not {"build", "_cache"} & set(page.parts)),
+]
 RUN_ELSEWHERE = {
     "other_libraries": "its programs need other libraries: tests/compat runs them",
     "enter_your_agent": "it trains for long: test_agents_entries runs it with a short training",

@@ -233,9 +233,8 @@ def _run(folder: Path, training: Training, progress: bool, report: Report | None
         )  # fmt: skip
     title = f"{training.algorithm.upper()} on {task}, seed {training.seed}: {steps:,} steps in {log.seconds:.0f} s"
     save_learning_curve(log, rows, training.algorithm, title, steps, folder / CURVE_FILE)
-    save_agents_footprints(
-        agents, task, folder / FOOTPRINTS_FILE, seed=first_seed("validation"), options=training.options
-    )  # fmt: skip
+    walked = {name: (agent, training.options) for name, agent in agents.items()}
+    save_agents_footprints(walked, task, folder / FOOTPRINTS_FILE, seed=first_seed("validation"))
     write_json(folder / EVALUATION_FILE, rows_to_plain(rows))  # last: it marks the run as finished
     return FinishedRun(policy, rows)
 
