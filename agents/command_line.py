@@ -154,9 +154,9 @@ def retrain(
 
 @_command("tune")
 def tune(
-    agent: Annotated[str, Argument(help="feedback, lqr, ppo or sac.")],
+    agent: Annotated[str, Argument(help="feedback, lqr, linear, ppo or sac.")],
     task: Annotated[str, Argument(help="The task's name.")],
-    trials: Annotated[int, Option(help="Total number of trials, including those in the study already.")] = 100,
+    trials: Annotated[int, Option(help="Total number of trials, including those in the study already; of linear, generations of 16 laws.")] = 100,
     episodes: Annotated[int | None, Option(help="Episodes that settings are scored on; 128 for feedback and lqr, 512 for learners "
         "otherwise.")] = None,
     horizon: Annotated[float | None, Option(help="Length of these episodes, of controllers; the task's otherwise.")] = None,
@@ -173,6 +173,15 @@ def tune(
     from .tuning.study import Tuning, best_trial, result_words
     from .tuning.study import tune as run_trials
 
+    if agent == "linear":
+        from .tuning.linear import tune_linear
+
+        file = out or Path("runs", "tuning", f"{agent}-{task}.best.json")
+        score = tune_linear(task, trials, file, shown=typer.echo)
+        typer.echo(
+            f"best: {score:.2f}, written to {file}; keep it by: python -m {__package__} ship {file} --replace"
+        )
+        return
     place = Path("runs", "tuning", f"{agent}-{task}.db") if storage is None else storage
     best_file = place.with_suffix(".best.json") if out is None else out
     tuning = Tuning.of(
@@ -310,7 +319,7 @@ def command_as_typed() -> str:
 @_command("reference")
 def reference(
     task: Tasks = None,
-    episodes: Annotated[int, Option(help="Validation episodes that are searched.")] = 32,
+    episodes: Annotated[int, Option(help="Validation episodes that are searched.")] = 16,
     again: Annotated[bool, Option("--again", help="Search also for tasks that the file has a reference of.")] = False,
     processes: Annotated[int, Option(min=1, help="Processes, each at a task of its own.")] = 1,
     out: Annotated[Path | None, Option(help="JSON file of references; the package's own otherwise.")] = None,

@@ -133,12 +133,15 @@ def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
 _STEERED = ("Heading", "SpeedHeading", "UTurn", "Level", "Energy", "UnknownBody", "Hills")
 """Tasks that command a heading."""
 
+LINEAR_TASKS = tuple(all_settings().get("linear", {}))
+"""Tasks for which a linear law was found."""
+
 AGENTS: dict[str, AgentEntry] = {
     "random": AgentEntry("baseline", lambda asked: RandomController(asked.seed, _layout(asked))),
     "fixed": AgentEntry("baseline", lambda asked: FixedController(_layout(asked))),
     "feedback": AgentEntry("feedback", _feedback, _STEERED),
     "lqr": AgentEntry("feedback", _lqr),
-    "linear": AgentEntry("feedback", _linear, tuple(all_settings().get("linear", {}))),
+    "linear": AgentEntry("feedback", _linear, LINEAR_TASKS),
     "mpc": AgentEntry("planner", _mpc, tuple(TASK_VERSIONS)),
     "ppo": AgentEntry("learned", _trained("ppo")),
     "sac": AgentEntry("learned", _trained("sac")),

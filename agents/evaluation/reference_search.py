@@ -27,15 +27,15 @@ from .episodes import direction
 from .scoring import run_seeds
 
 SEARCHES = (
-    MpcSettings(steps=6, samples=48, iterations=4, trust=0.0, scenarios=0),
-    MpcSettings(steps=12, window=30.0, samples=48, iterations=4, trust=0.0, scenarios=0),
+    MpcSettings(steps=6, samples=32, iterations=3, trust=0.0, scenarios=0),
+    MpcSettings(steps=12, window=30.0, samples=32, iterations=3, trust=0.0, scenarios=0),
 )
 """Short plans and long ones: which are better depends on the task and on the episode."""
-EPISODES, MEAN_EPISODES = 32, 1024
+EPISODES, MEAN_EPISODES = 16, 512
 """Episodes of the search, and of agents that take no time."""
 SEED = 1
 """Of the validation episodes."""
-HORIZONS = {"Metastable": 1000.0}
+HORIZONS = {"Metastable": 400.0}
 """Of tasks whose episodes are too long to plan all of their steps."""
 _TIME_PER_FALL = "time_per_fall"
 

@@ -7,6 +7,7 @@ comes to is compared on validation episodes with the law that it began with, whi
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from cmaes import CMA
@@ -14,6 +15,7 @@ from cmaes import CMA
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
+from lean_yaw_env.files import write_json
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.validation import require_count
 
@@ -25,7 +27,7 @@ from ..seeds import training_seed
 
 POPULATION, EPISODES = 16, 48
 """Laws of a generation, and the episodes that each walks."""
-GENERATIONS = 150
+GENERATIONS = 100
 _VALIDATION_EPISODES = 512
 _SEED = 1000  # of the first generation's training episodes
 _SIGMA = 0.1  # first standard deviation of a weight
@@ -68,6 +70,17 @@ def search_linear(
             if score > best:
                 best, found = score, search.mean.copy()
     return _settings(found), best
+
+
+def tune_linear(
+    task: str, generations: int, file: Path, *, shown: Callable[[str], object] = print
+) -> float:
+    """Search for a law, write it as ``shipping.ship`` takes it, and return its mean return."""
+    found, score = search_linear(task, generations, shown=shown)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    values = {"weights": list(found.weights)}
+    write_json(file, {"agent": "linear", "task": task, "score": score, "values": values})
+    return score
 
 
 def _horizon(task: str) -> float:
