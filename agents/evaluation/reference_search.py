@@ -5,6 +5,7 @@ No agent can do that, so that a reference is a score to come near to rather than
 
 from __future__ import annotations
 
+import contextlib
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.files import write_json
 from lean_yaw_env.parameters import Vector
 
@@ -123,7 +125,8 @@ def _bases(task: str, options: EnvOptions) -> dict[str, Agent]:
     for name in names_for(request, ("feedback", "learned")):
         entry = agent_entry(name)
         if entry.kind == "feedback":
-            found[name] = make_agent(name, request)
+            with contextlib.suppress(NoGaitError):
+                found[name] = make_agent(name, request)
             continue
         for folder in () if entry.options else policy_folders(name, request):
             policy = load(folder)
