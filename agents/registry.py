@@ -133,6 +133,9 @@ def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
 _STEERED = ("Heading", "SpeedHeading", "UTurn", "Level", "Energy", "UnknownBody", "Hills")
 """Tasks that command a heading."""
 
+_REGULATED = tuple(task for task in ALL_TASKS if task not in ("LevelUphill", "Energy"))
+"""Tasks that the regulator is for. Without a slope it needs settings of pumping, which are found for Level alone."""
+
 LINEAR_TASKS = tuple(all_settings().get("linear", {}))
 """Tasks for which a linear law was found."""
 
@@ -140,7 +143,7 @@ AGENTS: dict[str, AgentEntry] = {
     "random": AgentEntry("baseline", lambda asked: RandomController(asked.seed, _layout(asked))),
     "fixed": AgentEntry("baseline", lambda asked: FixedController(_layout(asked))),
     "feedback": AgentEntry("feedback", _feedback, _STEERED),
-    "lqr": AgentEntry("feedback", _lqr),
+    "lqr": AgentEntry("feedback", _lqr, _REGULATED),
     "linear": AgentEntry("feedback", _linear, LINEAR_TASKS),
     "mpc": AgentEntry("planner", _mpc, tuple(TASK_VERSIONS)),
     "ppo": AgentEntry("learned", _trained("ppo")),
