@@ -197,7 +197,7 @@ def _near(trial: Trial, path: str, start: float, entry: Range) -> float:
         value = trial.suggest_float(path, start - reach, start + reach)
     value = min(max(value, low), high)
     # gaits are computed anew for each offset that pumps, so that few of those are tried
-    return round(value, 3) if "pumping" in path else float(f"{value:.{DIGITS}g}")
+    return round(value, 3) if "pumping." in path else float(f"{value:.{DIGITS}g}")
 
 
 # ---- learners
