@@ -137,6 +137,12 @@ def cycle() -> analysis.LimitCycle:
 
 
 @functools.cache
+def atlas() -> analysis.Atlas:
+    gaits = analysis.stability_map(WALKER, {"slope": [0.01, 0.02]})
+    return analysis.Atlas(gaits, analysis.basin_sizes(gaits, every=1, n_steps=2))
+
+
+@functools.cache
 def branch() -> analysis.Branch:
     return analysis.continue_gait(WALKER, "slope", (0.009, 0.011), most_points=3)
 
@@ -415,7 +421,14 @@ ROWS |= {
     "basin_sizes": Row(
         constant(analysis.basin_sizes),
         {"gaits": lambda: atlas().gaits},
-        {"gaits": OBJECT, "every": count(0), "n_steps": N_STEPS, "path": optional(PATH), "engine": OBJECT, "progress": FLAG},
+        {
+            "gaits": OBJECT,
+            "every": count(0),
+            "n_steps": N_STEPS,
+            "path": optional(PATH),
+            "engine": OBJECT,
+            "progress": FLAG,
+        },
     ),
     "Engine": Row(
         constant(analysis.Engine),
