@@ -411,16 +411,16 @@ ROWS |= {
     ),
     "Atlas": Row(
         constant(analysis.Atlas),
-        {},
+        lambda: {"gaits": atlas().gaits},
         {"gaits": OBJECT},
         free=("basins",),
     ),
-    "Atlas.nearest_stable": Row(lambda: atlas().nearest_stable, {}, {"slope": FINITE}),
-    "Atlas.fastest_stable": Row(lambda: atlas().fastest_stable, {}, {"slope": ((0.5, 0.6),)}),
+    "Atlas.nearest_stable": Row(lambda: atlas().nearest_stable),
+    "Atlas.fastest_stable": Row(lambda: atlas().fastest_stable),
     "Atlas.largest_basin": Row(lambda: atlas().largest_basin, {}, {"speed": number(-0.1)}),
     "basin_sizes": Row(
         constant(analysis.basin_sizes),
-        {"gaits": lambda: atlas().gaits},
+        lambda: {"gaits": atlas().gaits},
         {
             "gaits": OBJECT,
             "every": count(0),
