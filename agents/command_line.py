@@ -352,7 +352,7 @@ def robustness(
     task: Tasks = None,
     agents: Annotated[str, Option(help="Agents, separated by commas, or all.")] = ALL,
     episodes: Annotated[int, Option(help="Episodes of each agent under each variation, for each of its trainings.")] = 100,
-    costly_episodes: Annotated[int, Option(help="Largest number of episodes for agents that plan at every step (mpc).")] = 6,
+    costly_episodes: Annotated[int, Option(help="Largest number of episodes for agents that plan at every step (mpc).")] = 5,
     seed: Annotated[int, Option(help="Seed of the validation episodes.")] = 0,
     agent_path: AgentPath = None,
     runs: Runs = Path("runs"),

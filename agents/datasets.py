@@ -55,7 +55,7 @@ def make_dataset(
         If Minari is not installed.
     """
     with needs_extra("compat"):
-        import minari
+        import minari  # pyright: ignore[reportMissingImports]
     require_choice("kind", kind, KINDS)
     require_count("episodes", episodes, 1, MOST_WALKERS)
     env_id, first = env_id_of(task), training_seed(seed)

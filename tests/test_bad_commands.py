@@ -45,6 +45,7 @@ BODY = {
     "--ankle-damping": (*NUMBER, "-1"),
 }
 COMMAND = {"--inter-leg-angle": (*POSITIVE, "2"), "--mass-offset": (*NUMBER, "-1.1", "2")}
+ENGINE = {"--threads": COUNT, "--workers": COUNT, "--scheduler": ("", "tcp://127.0.0.1:9")}
 SPEEDS = {"--speeds": ("", "x", "1:2", "2:1:3", "1:2:1", "nan")}
 TRAIN = {
     **OPTIONS,
@@ -56,11 +57,12 @@ SMALL = ["--steps", "64", "--episodes", "1", "--out", "made"]
 
 COMMANDS: dict[tuple[str, str], tuple[list[str], dict[str, tuple[str, ...]]]] = {
     ("lean-yaw", "gait"): ([], {**COMMAND, "--alternating-offset": (*NUMBER, "-1.1", "2"), **BODY}),
-    ("lean-yaw", "map"): (["slope=0.01"], {"AXIS": AXIS, **COMMAND, "--threads": COUNT, "--out": PLACE, **BODY}),
+    ("lean-yaw", "map"): (["slope=0.01"], {"AXIS": AXIS, **COMMAND, **ENGINE, "--out": PLACE, **BODY}),
     ("lean-yaw", "basin"): (
         ["stance_pitch=0.15", "ankle_angle=0", "--steps", "1"],
-        {**COMMAND, "--steps": COUNT, "--out": PLACE, **BODY},
+        {**COMMAND, "--steps": COUNT, **ENGINE, "--out": PLACE, **BODY},
     ),
+    ("lean-yaw", "atlas"): (["slope=0.9", "--out", "made"], {"AXIS": AXIS, "--every": (), **ENGINE}),
     ("lean-yaw", "bicycle"): ([], {**SPEEDS, **PLOT, "--parameters": ("no-such-file.json",)}),
     ("lean-yaw", "skateboard"): (
         [],

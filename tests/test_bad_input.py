@@ -403,6 +403,20 @@ ROWS |= {
             "progress": FLAG,
         },
     ),
+    "Atlas": Row(
+        constant(analysis.Atlas),
+        {},
+        {"gaits": OBJECT},
+        free=("basins",),
+    ),
+    "Atlas.nearest_stable": Row(lambda: atlas().nearest_stable, {}, {"slope": FINITE}),
+    "Atlas.fastest_stable": Row(lambda: atlas().fastest_stable, {}, {"slope": ((0.5, 0.6),)}),
+    "Atlas.largest_basin": Row(lambda: atlas().largest_basin, {}, {"speed": number(-0.1)}),
+    "basin_sizes": Row(
+        constant(analysis.basin_sizes),
+        {"gaits": lambda: atlas().gaits},
+        {"gaits": OBJECT, "every": count(0), "n_steps": N_STEPS, "path": optional(PATH), "engine": OBJECT, "progress": FLAG},
+    ),
     "Engine": Row(
         constant(analysis.Engine),
         {},

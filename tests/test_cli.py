@@ -21,7 +21,7 @@ from lean_yaw_env.cli.records import as_json, text_of
 from lean_yaw_env.plots import basin_figure, gait_figure, map_figure
 from lean_yaw_env.vehicles import BENCHMARK_2007, benchmark_bicycle
 
-COMMANDS = ("gait", "map", "basin", "bicycle", "skateboard", "reproduce", "play", "view")
+COMMANDS = ("gait", "map", "basin", "atlas", "bicycle", "skateboard", "reproduce", "play", "view")
 runner = CliRunner()
 
 

@@ -1,7 +1,7 @@
 """Linear laws by direct search: CMA-ES (Hansen 2016) over all weights, a whole generation walked as one batch.
 
 Every generation walks training episodes of its own, the same for all of its laws, so that no law is chosen for the episodes that it walked. What the search
-comes to is compared on validation episodes with the law that it began with, which imitates the regulator.
+comes to is compared on validation episodes with the law that it began with, which imitates another agent.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from lean_yaw_env.validation import require_count
 from ..agent import Agent
 from ..controllers.linear import LinearLaw, LinearSettings
 from ..evaluation.scoring import run_episodes, run_seeds
-from ..registry import AgentRequest, env_id_of, make_agent
+from ..registry import AgentRequest, env_id_of, make_all
 from ..seeds import training_seed
 
 POPULATION, EPISODES = 16, 48
@@ -30,6 +30,7 @@ POPULATION, EPISODES = 16, 48
 GENERATIONS = 100
 _VALIDATION_EPISODES = 512
 _SEED = 1000  # of the first generation's training episodes
+_TEACHERS = ("feedback", "lqr", "ppo")  # imitated to begin with
 _SIGMA = 0.1  # first standard deviation of a weight
 _DIGITS = 4  # that are kept of each
 _LONGEST = 300.0  # time units of an episode
@@ -39,7 +40,7 @@ _CHECKS = 5  # times that the law is compared
 def search_linear(
     task: str, generations: int = GENERATIONS, *, shown: Callable[[str], object] = print
 ) -> tuple[LinearSettings, float]:
-    """The best law found and its mean return on validation episodes, at least that of the package's law or of the one that imitates the regulator.
+    """The best law found and its mean return on validation episodes, at least that of the package's law and of laws that imitate other agents.
 
     Parameters
     ----------
@@ -50,11 +51,11 @@ def search_linear(
     law = LinearLaw(task)
     shape = law.matrix.shape
     options = EnvOptions(horizon=_horizon(task))
-    starts = [law.matrix, _imitation(task, options, law)]
-    scores = [_mean_return(task, options, _law(task, start.ravel())) for start in starts]
-    best = max(scores)
-    found = starts[scores.index(best)].ravel()
-    shown(f"start: the package's law {scores[0]:.2f}, the regulator's imitation {scores[1]:.2f}")
+    starts = {"the package's law": law.matrix.ravel()} | _imitations(task, options)
+    scores = {name: _mean_return(task, options, _law(task, each)) for name, each in starts.items()}
+    best = max(scores.values())
+    found = starts[max(scores, key=lambda name: scores[name])]
+    shown("start: " + ", ".join(f"{name} {score:.2f}" for name, score in scores.items()))
     search = CMA(mean=found, sigma=_SIGMA, population_size=POPULATION, seed=0)
     for generation in range(generations):
         tried = np.stack([search.ask() for _ in range(POPULATION)])
@@ -100,16 +101,21 @@ def _mean_return(task: str, options: EnvOptions, agent: Agent) -> float:
     return float(walked.metrics["return"].mean())
 
 
-def _imitation(task: str, options: EnvOptions, law: LinearLaw) -> Vector:
-    """The matrix that comes nearest to the regulator's actions in episodes that it walks."""
-    regulator = make_agent("lqr", AgentRequest(env_id_of(task), options))
-    env = WalkerVectorEnv(256, task, step_info=False, **vars(options))
-    seen, _ = env.reset(seed=training_seed(_SEED - 1))
-    observed, chosen = [], []
-    for _ in range(200):
-        actions = regulator.predict(seen)[0]
-        observed.append(np.column_stack([seen, np.ones(len(seen))]))
-        chosen.append(actions)
-        seen = env.step(actions)[0]
-    matrix = np.linalg.lstsq(np.concatenate(observed), np.concatenate(chosen), rcond=None)[0].T
-    return matrix.reshape(law.matrix.shape)
+def _imitations(task: str, options: EnvOptions) -> dict[str, Vector]:
+    """The weights that come nearest to the actions of other agents in episodes that these walk."""
+    request = AgentRequest(env_id_of(task), options, runs=None)
+    found: dict[str, Vector] = {}
+    for name, agent in make_all(request, ("feedback", "learned")).items():
+        if name not in _TEACHERS:
+            continue
+        env = WalkerVectorEnv(256, task, step_info=False, **vars(options))
+        seen, _ = env.reset(seed=training_seed(_SEED - 1))
+        observed, chosen = [], []
+        for _ in range(200):
+            actions = agent.predict(seen)[0]
+            observed.append(np.column_stack([seen, np.ones(len(seen))]))
+            chosen.append(actions)
+            seen = env.step(actions)[0]
+        matrix = np.linalg.lstsq(np.concatenate(observed), np.concatenate(chosen), rcond=None)[0].T
+        found[f"an imitation of {name}"] = matrix.ravel()
+    return found
