@@ -241,7 +241,10 @@ def _run(folder: Path, training: Training, progress: bool, report: Report | None
 
 def _write_statistics(folder: Path, policy: Policy) -> None:
     """The statistics that normalise observations, for people; the policy's own file has them too."""
-    mean, variance = policy.weights["observation_mean"], policy.weights["observation_variance"]
+    size = len(policy.card.layout.names)  # of the latest frame, where a policy sees several
+    mean, variance = (
+        policy.weights[f"observation_{name}"][-size:] for name in ("mean", "variance")
+    )
     record = {
         name: {"mean": float(m), "variance": float(v)}
         for name, m, v in zip(policy.card.layout.names, mean, variance, strict=True)
