@@ -77,6 +77,20 @@ COMMANDS: dict[tuple[str, str], tuple[list[str], dict[str, tuple[str, ...]]]] = 
     ("lean-yaw", "findings"): ([], {"--out": ()}),
     ("agents", "train"): (SMALL, TRAIN),
     ("train.py", ""): (SMALL, TRAIN),
+    ("agents", "retrain"): (
+        ["--task", "Walk", "--algorithm", "ppo", "--jobs", "1", *SMALL],
+        {
+            "--task": TEXT, "--algorithm": TEXT, "--jobs": COUNT, "--steps": COUNT, "--episodes": COUNT, "--out": (),
+        },
+    ),
+    ("agents", "reference"): (
+        ["--task", "Walk", "--episodes", "1", "--out", "made.json"],
+        {"--task": TEXT, "--episodes": COUNT, "--processes": COUNT, "--out": ()},
+    ),
+    ("agents", "dataset"): (
+        ["--task", "Walk", "--kind", "random", "--episodes", "1", "--out", "made"],
+        {"--task": TEXT, "--kind": TEXT, "--expert": TEXT, "--episodes": COUNT, "--seed": SEEDS, "--out": ()},
+    ),
     ("agents", "tune"): (
         ["feedback", "Heading", "--trials", "1", "--episodes", "1", "--horizon", "1"],
         {

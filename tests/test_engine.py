@@ -225,7 +225,7 @@ def test_a_store_may_be_in_an_object_store(tmp_path: Path, monkeypatch: pytest.M
         host, port = server.get_host_and_port()
         options = {
             "endpoint_url": f"http://{host}:{port}", "key": "key", "secret": "secret",
-            "client_kwargs": {"region_name": "us-east-1"},
+            "client_kwargs": {"region_name": "eu-west-1"},
         }  # fmt: skip
         monkeypatch.setitem(fsspec.config.conf, "s3", options)
         fsspec.filesystem("s3").mkdir("maps")
