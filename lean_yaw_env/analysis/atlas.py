@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lean_yaw_env.analysis.active_map import ActiveMap
-from lean_yaw_env.analysis.filling import Arrays, Box, Layout, fill_grid, write_box
+from lean_yaw_env.analysis.filling import Arrays, Box, Layout, fill_grid, values_in, write_box
 from lean_yaw_env.analysis.gait_map import walker_grid
 from lean_yaw_env.analysis.storage import labelled
 from lean_yaw_env.engine import ONE_THREAD, Engine
@@ -98,13 +98,12 @@ class _Basins:
     def __call__(self, arrays: Arrays, region: Box, number: int) -> int:
         stable = self.stable[region].ravel()
         states = self.states[region].reshape(-1, STATE_SIZE)
-        parts = [axis[s] for axis, s in zip(self.axes.values(), region, strict=True)]
-        points = [grid.ravel() for grid in np.meshgrid(*parts, indexing="ij")]
+        designs = values_in(self.axes, region)
         sizes = np.full(stable.size, np.nan)
         who = np.flatnonzero(stable)
         for first in range(0, who.size, _DESIGNS_AT_ONCE):
             some = who[first : first + _DESIGNS_AT_ONCE]
-            here = {name: values[some] for name, values in zip(self.axes, points, strict=True)}
+            here = {name: values[some] for name, values in designs.items()}
             sizes[some] = _survived(here, states[some], self.n_steps)
         write_box(arrays, region, {"basin": sizes})
         return 0

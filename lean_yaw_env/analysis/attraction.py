@@ -17,6 +17,7 @@ from lean_yaw_env.analysis.filling import (
     Columns,
     Layout,
     fill_grid,
+    values_in,
     write_box,
 )
 from lean_yaw_env.analysis.limit_cycle import LimitCycle, find_limit_cycle
@@ -160,10 +161,9 @@ def states_in(
     section_map: SectionMap, axes: Mapping[str, Vector], box: Box, centre: Vector
 ) -> Vector:
     """The states (n, k) of a part of a slice or box of the section, the other coordinates those of ``centre`` (k,)."""
-    parts = [values[s] for values, s in zip(axes.values(), box, strict=True)]
-    columns = [grid.ravel() for grid in np.meshgrid(*parts, indexing="ij")]
-    states = np.tile(centre, (columns[0].size, 1))
-    states[:, [section_map.names.index(name) for name in axes]] = np.column_stack(columns)
+    columns = np.column_stack([*values_in(axes, box).values()])
+    states = np.tile(centre, (len(columns), 1))
+    states[:, [section_map.names.index(name) for name in axes]] = columns
     return states
 
 

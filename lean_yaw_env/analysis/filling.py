@@ -177,6 +177,13 @@ def points_of(region: Box, shape: tuple[int, ...]) -> NDArray[np.intp]:
     return np.ravel_multi_index([place.ravel() for place in places], shape)
 
 
+def values_in(axes: Mapping[str, Vector], region: Box) -> dict[str, Vector]:
+    """The values of all axes at each point of a box of a grid, in row-major order."""
+    parts = [axis[s] for axis, s in zip(axes.values(), region, strict=True)]
+    columns = np.meshgrid(*parts, indexing="ij")
+    return {name: column.ravel() for name, column in zip(axes, columns, strict=True)}
+
+
 def read_box(arrays: Arrays, name: str, box: Box) -> NDArray[Any]:
     """A copy of a column's rows in a box."""
     rows = np.array(arrays[name][box])
