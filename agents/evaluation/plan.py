@@ -130,7 +130,8 @@ class Evaluation:
         """Agents of the registry for tasks; all that there are for a task, in the registry's order, if none is named.
 
         Of several tasks, an agent that is not for one is left out there; of one task that is an error. ``path`` may be a policy's folder, which
-        then stands for its algorithm's agent, or an entry's, which is added.
+        then stands for its algorithm's agent, or an entry's, which is added. Agents that plan walk until a fall only if they are named: an episode
+        takes them minutes.
 
         Raises
         ------
@@ -148,6 +149,8 @@ class Evaluation:
             request = AgentRequest(env_id, self.options, seed=self.seed, runs=self.runs)
             of_folder = replace(request, path=path)
             there = names_for(of_folder if names else request)
+            if task_named(task).headline == TIME_PER_FALL:
+                there = tuple(name for name in there if name in names or not _plans(name))
             if own is not None and own.env_id == env_id:
                 there = tuple(dict.fromkeys((*there, own.algorithm)))
             chosen = [name for name in dict.fromkeys(names) if len(tasks) == 1 or name in there]
