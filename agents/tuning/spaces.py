@@ -146,8 +146,6 @@ RANGES: dict[tuple[str, str], dict[str, Range]] = {
     ("lqr", "SpeedHeading"): _LOOP | _LIMIT | _SPEED_COST,
     ("lqr", "UTurn"): _LOOP | _ANGLE | _TURN | _PUMPING | _UPHILL,
     ("lqr", "Level"): _LOOP | _ANGLE | _TURN | _PUMPING,
-    ("lqr", "LevelUphill"): _LOOP | _ANGLE | _TURN | _PUMPING,
-    ("lqr", "Energy"): _LOOP | _LIMIT | _SPEED_COST | _PUMPING,
     ("lqr", "UnknownBody"): _LOOP | _ANGLE | _TURN,
     ("lqr", "Hills"): _LOOP | _LIMIT | _SPEED_COST | _PUMPING,
     ("lqr", "Walk"): _LOOP | _ANGLE,
