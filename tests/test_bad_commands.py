@@ -62,7 +62,7 @@ COMMANDS: dict[tuple[str, str], tuple[list[str], dict[str, tuple[str, ...]]]] = 
         ["stance_pitch=0.15", "ankle_angle=0", "--steps", "1"],
         {**COMMAND, "--steps": COUNT, **ENGINE, "--out": PLACE, **BODY},
     ),
-    ("lean-yaw", "atlas"): (["slope=0.9", "--out", "made"], {"AXIS": AXIS, "--every": (), **ENGINE}),
+    ("lean-yaw", "atlas"): (["slope=0.01", "--out", "made"], {"AXIS": AXIS, "--every": COUNT, "--out": PLACE, **ENGINE}),
     ("lean-yaw", "bicycle"): ([], {**SPEEDS, **PLOT, "--parameters": ("no-such-file.json",)}),
     ("lean-yaw", "skateboard"): (
         [],
