@@ -136,6 +136,9 @@ _STEERED = ("Heading", "SpeedHeading", "UTurn", "Level", "Energy", "UnknownBody"
 _REGULATED = tuple(task for task in ALL_TASKS if task not in ("LevelUphill", "Energy"))
 """Tasks that the regulator is for. Without a slope it needs settings of pumping, which are found for Level alone."""
 
+_PLANNED = tuple(task for task in TASK_VERSIONS if task != "Metastable")
+"""Tasks that planning is for. A walk at Metastable lasts so long that an episode would take minutes."""
+
 LINEAR_TASKS = tuple(all_settings().get("linear", {}))
 """Tasks for which a linear law was found."""
 
@@ -145,7 +148,7 @@ AGENTS: dict[str, AgentEntry] = {
     "feedback": AgentEntry("feedback", _feedback, _STEERED),
     "lqr": AgentEntry("feedback", _lqr, _REGULATED),
     "linear": AgentEntry("feedback", _linear, LINEAR_TASKS),
-    "mpc": AgentEntry("planner", _mpc, tuple(TASK_VERSIONS)),
+    "mpc": AgentEntry("planner", _mpc, _PLANNED),
     "ppo": AgentEntry("learned", _trained("ppo")),
     "sac": AgentEntry("learned", _trained("sac")),
     "apg": AgentEntry("learned", _trained("apg")),

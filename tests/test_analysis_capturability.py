@@ -164,7 +164,7 @@ def test_an_interrupted_map_goes_on_and_holds_the_first_commands(tmp_path: Path,
     monkeypatch.setattr(capturability, "capture", interrupted)
     with pytest.raises(KeyboardInterrupt):
         capture_map(WALKER, AXES, path=path)
-    assert int((load_dataset(path).least_steps >= 0).sum()) == 44  # four rows
+    assert int((load_dataset(path).least_steps >= 0).sum()) == 44  # a region of four rows
     data = capture_map(WALKER, AXES, path=path)
     assert np.array_equal(data.least_steps.to_numpy().ravel(), found.least_steps)
     first = np.stack([data.inter_leg_angle, data.mass_offset], axis=-1).reshape(-1, 2)

@@ -45,7 +45,7 @@ BODY = {
     "--ankle-damping": (*NUMBER, "-1"),
 }
 COMMAND = {"--inter-leg-angle": (*POSITIVE, "2"), "--mass-offset": (*NUMBER, "-1.1", "2")}
-ENGINE = {"--threads": COUNT, "--workers": COUNT, "--scheduler": ("", "tcp://127.0.0.1:9")}
+ENGINE = {"--threads": COUNT, "--workers": COUNT, "--scheduler": ("", "nowhere")}
 SPEEDS = {"--speeds": ("", "x", "1:2", "2:1:3", "1:2:1", "nan")}
 TRAIN = {
     **OPTIONS,
@@ -77,6 +77,20 @@ COMMANDS: dict[tuple[str, str], tuple[list[str], dict[str, tuple[str, ...]]]] = 
     ("lean-yaw", "findings"): ([], {"--out": ()}),
     ("agents", "train"): (SMALL, TRAIN),
     ("train.py", ""): (SMALL, TRAIN),
+    ("agents", "retrain"): (
+        ["--task", "Walk", "--algorithm", "ppo", "--jobs", "1", *SMALL],
+        {
+            "--task": TEXT, "--algorithm": TEXT, "--jobs": COUNT, "--steps": COUNT, "--episodes": COUNT, "--out": (),
+        },
+    ),
+    ("agents", "reference"): (
+        ["--task", "Walk", "--episodes", "1", "--out", "made.json"],
+        {"--task": TEXT, "--episodes": COUNT, "--processes": COUNT, "--out": ()},
+    ),
+    ("agents", "dataset"): (
+        ["--task", "Walk", "--kind", "random", "--episodes", "1", "--out", "made"],
+        {"--task": TEXT, "--kind": TEXT, "--expert": TEXT, "--episodes": COUNT, "--seed": SEEDS, "--out": ()},
+    ),
     ("agents", "tune"): (
         ["feedback", "Heading", "--trials", "1", "--episodes", "1", "--horizon", "1"],
         {

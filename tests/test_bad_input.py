@@ -195,7 +195,8 @@ OPTIONS = {
     "max_offset_change": optional(number(-0.1, 2.1)), "horizon": optional(POSITIVE),
     "start_disturbance": number(-0.1, 5.1), "mirror": FLAG, "slope": optional(number(0.6)),
     "friction_limit": optional(POSITIVE), "sensor_noise": number(-0.1, 11.0), "action_delay": FLAG,
-    "hidden_rates": FLAG, "random_body": optional(NAME), "push_level": optional(number(-0.1, 11.0)),
+    "hidden_rates": optional(FLAG), "random_body": optional(NAME), "push_level": optional(number(-0.1, 11.0)),
+    "show_body": FLAG,
 }  # fmt: skip
 PARAMETERS = {
     "hip_width": number(-0.1, 2.1), "foot_radius": number(-0.1, 1.0), "ankle_tilt": number(0.0, 1.6),
@@ -436,7 +437,7 @@ ROWS |= {
         {
             "threads": count(0, 2000),
             "workers": optional(count(0, 2000)),
-            "scheduler": optional(NAME),
+            "scheduler": (3, b"tcp://host", [], ""),
         },
     ),
     "continue_gait": Row(
@@ -597,6 +598,10 @@ ROWS |= {
             "pumping": OFFSET,
             "goal_radius": POSITIVE,
             "is_ranked": FLAG,
+            "hidden_rates": FLAG,
+            "random_body": NAME,
+            "body_reach": ("word", (0.1,), (NAN, 0.1, 0.1, 0.1), (-0.1, 0.1, 0.1, 0.1)),
+            "slope_varies": FLAG,
         },
         free=(
             "name",
@@ -925,7 +930,7 @@ ROWS |= {
         {
             **{
                 name: FINITE
-                for name in ("proportional", "ankle", "ankle_rate", "feedforward", "inter_leg_angle", "speed", "speed_error")
+                for name in ("proportional", "ankle", "ankle_rate", "feedforward", "inter_leg_angle", "speed", "speed_error", "pumping_by_speed")
             },
             "pumping": OBJECT,
         },
@@ -952,7 +957,7 @@ RESULTS = {
 INSIDE = {
     "fall_of", "formula", "normal", "step_passive_rows", "uniform",
     "Simulation", "CharacteristicPolynomial.derivative", "CharacteristicPolynomial.eigenvalue_rate", "ControlInterface", "ClosedLoopMap",
-    "Agent", "GoalFromWalker.forward", "progress_bar", "require_memory", "Capture.share", "Body.ankle_rotation", "LegShape.axis_ends",
+    "Agent", "Engine.started", "GoalFromWalker.forward", "progress_bar", "require_memory", "Capture.share", "Body.ankle_rotation", "LegShape.axis_ends",
     "RealTime.reset", "RealTime.step", "SectionMap.step_commanded", "ActiveMap.step_commanded", "Task.measure", "SectionMap.image",
     *(f"{kind}.{name}" for kind in ("SectionMap", "ActiveMap", "PassiveMap") for name in ("linear_step", "results", "step_many")),
     "SectionMap.require_state",

@@ -223,8 +223,10 @@ def test_a_store_may_be_in_an_object_store(tmp_path: Path, monkeypatch: pytest.M
     server.start()
     try:
         host, port = server.get_host_and_port()
-        options = {"endpoint_url": f"http://{host}:{port}", "key": "key", "secret": "secret"}
-        monkeypatch.setenv("AWS_DEFAULT_REGION", "us-east-1")
+        options = {
+            "endpoint_url": f"http://{host}:{port}", "key": "key", "secret": "secret",
+            "client_kwargs": {"region_name": "eu-west-1"},
+        }  # fmt: skip
         monkeypatch.setitem(fsspec.config.conf, "s3", options)
         fsspec.filesystem("s3").mkdir("maps")
         alone = stability_map(WALKER, AXES)
