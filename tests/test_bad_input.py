@@ -949,7 +949,7 @@ RESULTS = {
     "Agent", "BatchResult", "BicycleMotion", "Branch", "CanonicalMatrices", "CharacteristicPolynomial", "ClosedLoopMap", "Command",
     "ContactForces", "ControlInterface", "Disturbance", "DoubleRoot", "EigenvalueBranches", "EnergyLedger", "Event", "Fall", "FallCode",
     "Feature", "FellError", "Field", "FloorDemand", "ForceExtremes", "Goal", "HindsightReplay", "LargestPushes", "LeanEquation",
-    "ClusterError", "LeanYawError", "LegShape", "LimitCycle", "Metric", "Mode", "MultibodyStep", "NoGaitError", "PassiveGait", "PassiveStep",
+    "LeanYawError", "LegShape", "LimitCycle", "Metric", "Mode", "MultibodyStep", "NoGaitError", "PassiveGait", "PassiveStep",
     "PassiveWalk", "Policy", "PolicyCard", "PolicyFileError", "Capture", "SectionMap", "SkateboardMotion", "SolverError",
     "SpeedRange", "StepDemand", "StepResult", "Table3Column", "Trajectory", "Walk", "WalkerShape",
 }  # fmt: skip
