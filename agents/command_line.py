@@ -319,7 +319,7 @@ def command_as_typed() -> str:
 @_command("reference")
 def reference(
     task: Tasks = None,
-    episodes: Annotated[int, Option(help="Validation episodes that are searched.")] = 16,
+    episodes: Annotated[int, Option(min=1, help="Validation episodes that are searched.")] = 16,
     again: Annotated[bool, Option("--again", help="Search also for tasks that the file has a reference of.")] = False,
     processes: Annotated[int, Option(min=1, help="Processes, each at a task of its own.")] = 1,
     out: Annotated[Path | None, Option(help="JSON file of references; the package's own otherwise.")] = None,

@@ -54,12 +54,12 @@ def make_dataset(
     gymnasium.error.DependencyNotInstalled
         If Minari is not installed.
     """
-    with needs_extra("compat"):
-        import minari  # pyright: ignore[reportMissingImports]
     require_choice("kind", kind, KINDS)
     require_count("episodes", episodes, 1, MOST_WALKERS)
     env_id, first = env_id_of(task), training_seed(seed)
     agent = make_agent(expert, AgentRequest(env_id, EnvOptions(), runs=None))
+    with needs_extra("compat"):
+        import minari  # pyright: ignore[reportMissingImports]
     out.mkdir(parents=True, exist_ok=True)
     os.environ["MINARI_DATASETS_PATH"] = str(out.absolute())
     name = f"leanyaw/{task.lower()}/{kind}-v{env_id.rpartition('-v')[2]}"

@@ -440,6 +440,7 @@ ROWS |= {
             "scheduler": (3, b"tcp://host", [], ""),
         },
     ),
+    "Engine.started": Row(lambda: analysis.Engine().started, free=("says_where",)),
     "continue_gait": Row(
         constant(analysis.continue_gait),
         {"walker": WALKER, "parameter": "slope", "limits": (0.009, 0.011), "most_points": 2},

@@ -155,11 +155,7 @@ def test_results_in_the_readme_are_those_of_the_leaderboard() -> None:
         if row is not None:
             bold = row["verdict"] == "better"
             mean = float(row["mean"])
-            text = (
-                f"{100 * mean:.1f} %"
-                if task == "Metastable"
-                else f"{mean:.{2 if task == 'Waypoint' else 1}f}"
-            )
+            text = f"{mean:.{2 if task in ('Waypoint', 'Metastable') else 1}f}"
             assert cell == (f"**{text}**" if bold else text), (task, agent)
 
 
