@@ -55,7 +55,8 @@ class Engine:
         if self.workers is not None:
             require_count("workers", self.workers, 1, MOST_THREADS)
         if self.scheduler is not None:
-            require_text("scheduler", self.scheduler)
+            if "://" not in require_text("scheduler", self.scheduler):
+                raise ValueError(f"scheduler must be an address such as tcp://host:8786, got {self.scheduler!r}")  # fmt: skip
             if self.workers is not None:
                 raise ValueError("give workers or scheduler, not both: a scheduler has its own")
 

@@ -45,7 +45,7 @@ BODY = {
     "--ankle-damping": (*NUMBER, "-1"),
 }
 COMMAND = {"--inter-leg-angle": (*POSITIVE, "2"), "--mass-offset": (*NUMBER, "-1.1", "2")}
-ENGINE = {"--threads": COUNT, "--workers": COUNT, "--scheduler": ("", "tcp://127.0.0.1:9")}
+ENGINE = {"--threads": COUNT, "--workers": COUNT, "--scheduler": ("", "nowhere")}
 SPEEDS = {"--speeds": ("", "x", "1:2", "2:1:3", "1:2:1", "nan")}
 TRAIN = {
     **OPTIONS,
@@ -62,7 +62,7 @@ COMMANDS: dict[tuple[str, str], tuple[list[str], dict[str, tuple[str, ...]]]] = 
         ["stance_pitch=0.15", "ankle_angle=0", "--steps", "1"],
         {**COMMAND, "--steps": COUNT, **ENGINE, "--out": PLACE, **BODY},
     ),
-    ("lean-yaw", "atlas"): (["slope=0.9", "--out", "made"], {"AXIS": AXIS, "--every": (), **ENGINE, "--scheduler": ("",), "--out": ()}),
+    ("lean-yaw", "atlas"): (["slope=0.01", "--out", "made"], {"AXIS": AXIS, "--every": COUNT, "--out": PLACE, **ENGINE}),
     ("lean-yaw", "bicycle"): ([], {**SPEEDS, **PLOT, "--parameters": ("no-such-file.json",)}),
     ("lean-yaw", "skateboard"): (
         [],

@@ -958,7 +958,7 @@ RESULTS = {
 INSIDE = {
     "fall_of", "formula", "normal", "step_passive_rows", "uniform",
     "Simulation", "CharacteristicPolynomial.derivative", "CharacteristicPolynomial.eigenvalue_rate", "ControlInterface", "ClosedLoopMap",
-    "Agent", "GoalFromWalker.forward", "progress_bar", "require_memory", "Capture.share", "Body.ankle_rotation", "LegShape.axis_ends",
+    "Agent", "Engine.started", "GoalFromWalker.forward", "progress_bar", "require_memory", "Capture.share", "Body.ankle_rotation", "LegShape.axis_ends",
     "RealTime.reset", "RealTime.step", "SectionMap.step_commanded", "ActiveMap.step_commanded", "Task.measure", "SectionMap.image",
     *(f"{kind}.{name}" for kind in ("SectionMap", "ActiveMap", "PassiveMap") for name in ("linear_step", "results", "step_many")),
     "SectionMap.require_state",

@@ -237,3 +237,20 @@ def test_a_store_may_be_in_an_object_store(tmp_path: Path, monkeypatch: pytest.M
             stability_map(WALKER, PUMPING, path="s3://maps/walker.zarr")
     finally:
         server.stop()
+
+
+def test_a_newcomer_splits_one_map_over_two_workers(tmp_path: Path) -> None:
+    places = tmp_path / "scheduler.json"
+    with ExitStack() as stack:
+        place = ["--scheduler-file", str(places)]
+        started(stack, "scheduler", "--port", "0", "--no-dashboard", *place)
+        address = json.loads(wait_for(places).read_text())["address"]
+        started(stack, "worker", address, "--nworkers", "2", "--nthreads", "1", "--no-dashboard")
+        engine = Engine(scheduler=address)
+        with engine.started() as run:
+            names = [name for _, name in run(lambda _, k: time.sleep(0.5) or distributed.get_worker().address, None, [(k,) for k in range(40)])]  # fmt: skip
+        assert len(set(names)) == 2
+        options = ["--scheduler", address, "--out", str(tmp_path / "map.zarr"), "--json"]
+        command = [sys.executable, "-m", "lean_yaw_env.cli", "map", "slope=0.01:0.02:2", *options]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    assert stability_map(WALKER, {"slope": [0.01, 0.02]}, path=tmp_path / "map.zarr").status.all()

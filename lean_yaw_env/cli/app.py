@@ -18,6 +18,7 @@ from lean_yaw_env.cli.commands import Output, add_command, parse_axes, parse_ran
 from lean_yaw_env.engine import Engine
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.validation import require_count, require_text
 from lean_yaw_env.walker import Walker
 
 app = typer.Typer(
@@ -142,6 +143,8 @@ def atlas(
     """Find the gaits of ten million designs, and basins on a coarser grid: slope, inter-leg angle, foot radius, hip width, ankle tilt."""
     from lean_yaw_env.analysis import DESIGNS, Atlas, basin_sizes, stability_map
 
+    require_text("out", out)
+    require_count("every", every)
     axes, engine = {**DESIGNS, **parse_axes(axis or [])}, Engine(threads, workers, scheduler)
     shown = _shows_progress(engine)
     gaits = stability_map(Walker(), axes, path=f"{out}/gaits.zarr", engine=engine, progress=shown)
