@@ -130,8 +130,9 @@ class _OnCluster:
     ) -> Iterator[tuple[int, Any]]:
         client, address, name = self._client, self._client.scheduler.address, f"lean-yaw-{uuid4()}"
         errors = self._distributed.client
-        # computed, not scattered: Dask computes it again where the worker that held it has died
-        held = client.submit(_same, shared, key=f"{name}-shared")
+        # computed, not scattered: Dask computes it again where the worker that held it has died. Its name has another beginning than the tasks':
+        # of one beginning, Dask keeps all tasks on the worker that holds it
+        held = client.submit(_same, shared, key=f"shared-by-{name}")
         futures = [
             client.submit(_call, _versions(), function, held, *task, key=f"{name}-{k}")
             for k, task in enumerate(tasks)
