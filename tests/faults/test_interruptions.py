@@ -36,16 +36,16 @@ COMMANDS: dict[str, tuple[list[str], Begun, str]] = {
         has("OUT/*/seed*/.lock", 2), "continue with: python -m agents train --resume",
     ),
     "tune": (
-        ["agents", "tune", "lqr", "Push", "--trials", "1000", "--storage", "OUT/study.db"],
+        ["agents", "tune", "lqr", "Metastable", "--trials", "1000", "--storage", "OUT/study.db"],
         says("1 of 1000"), "run the same command again to continue",
     ),
     "evaluate": (
-        ["agents", "evaluate", "--task", "Push", "--agents", "mpc", "--episodes", "400", "--costly-episodes", "400",
+        ["agents", "evaluate", "--task", "Metastable", "--agents", "mpc", "--episodes", "400", "--costly-episodes", "400",
          "--processes", "2", "--cache", "OUT"],
         says("evaluating"), "run the same command again to continue",
     ),
     "evaluate alone": (
-        ["agents", "evaluate", "--task", "Push", "--agents", "mpc", "--episodes", "400", "--costly-episodes", "400",
+        ["agents", "evaluate", "--task", "Metastable", "--agents", "mpc", "--episodes", "400", "--costly-episodes", "400",
          "--processes", "1", "--cache", "OUT"],
         says("evaluating"), "run the same command again to continue",
     ),
