@@ -9,6 +9,7 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Iterable
+from functools import partial
 from json import dumps
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -153,10 +154,10 @@ def retrain(
 
 @_command("tune")
 def tune(
-    agent: Annotated[str, Argument(help="feedback, lqr, mpc, ppo or sac.")],
+    agent: Annotated[str, Argument(help="feedback, lqr, ppo or sac.")],
     task: Annotated[str, Argument(help="The task's name.")],
     trials: Annotated[int, Option(help="Total number of trials, including those in the study already.")] = 100,
-    episodes: Annotated[int | None, Option(help="Episodes that settings are scored on; 128 for feedback and lqr, 24 for mpc, 512 for learners "
+    episodes: Annotated[int | None, Option(help="Episodes that settings are scored on; 128 for feedback and lqr, 512 for learners "
         "otherwise.")] = None,
     horizon: Annotated[float | None, Option(help="Length of these episodes, of controllers; the task's otherwise.")] = None,
     steps: Annotated[int | None, Option(help="Steps of each training, of learners; the task's own number otherwise.")] = None,
@@ -258,8 +259,10 @@ def evaluate(
     candidates = evaluation.candidates(tasks, [] if ALL in given else given)
     if pictures is not None:
         from .evaluation.leaderboard import save_footprints
+        from .evaluation.plan import make_candidate
 
-        save_footprints(candidates, pictures, seed=seed)
+        made = {each: make_candidate(each, each.folders[0], seed) for each in candidates}
+        save_footprints(made, pictures, seed=seed)
         return
     if out is None:
         found = evaluation.run(candidates)
@@ -302,6 +305,37 @@ def tasks_in(given: Iterable[str]) -> list[str]:
 def command_as_typed() -> str:
     """The command line, as a page quotes it."""
     return shlex.join(["python", "-m", str(__package__), *sys.argv[1:]])
+
+
+@_command("reference")
+def reference(
+    task: Tasks = None,
+    episodes: Annotated[int, Option(help="Validation episodes that are searched.")] = 32,
+    again: Annotated[bool, Option("--again", help="Search also for tasks that the file has a reference of.")] = False,
+    processes: Annotated[int, Option(min=1, help="Processes, each at a task of its own.")] = 1,
+    out: Annotated[Path | None, Option(help="JSON file of references; the package's own otherwise.")] = None,
+) -> None:  # fmt: skip
+    """Search for each task's reference score by planning that sees the future: normalised scores call it 1. Finished tasks are kept."""
+    from concurrent.futures import as_completed
+
+    from .evaluation.plan import worker_pool
+    from .evaluation.reference_search import find_reference, write_reference
+    from .references import FILE, read_references
+
+    file = FILE if out is None else out
+    keep(f"finished tasks are in {file}; {AGAIN}")
+    kept = read_references(file)
+    wanted = [each for each in tasks_in(task or ["Heading"]) if again or each not in kept]
+    with worker_pool(processes) as pool:
+        begun = {
+            pool.submit(find_reference, each, episodes, f"python -m {__package__} reference --task {each} --again"): each
+            for each in wanted
+        }  # fmt: skip
+        for future in as_completed(begun):
+            found, name = future.result(), begun[future]
+            write_reference(file, name, found)
+            typer.echo(f"{name}: fixed {found.fixed:.2f}, {found.base} {found.base_value:.2f}, reference {found.value:.2f}, "
+                f"+- {found.standard_error:.2f}, in {found.seconds:.0f} s")  # fmt: skip
 
 
 @_command("robustness")
@@ -351,13 +385,12 @@ def closed_loop(
 ) -> None:  # fmt: skip
     """Analyse walker and agent as one dynamical system: gait, eigenvalues, basins of attraction, largest pushes survived, contact forces and work."""
     from .evaluation.closed_loop_page import show, write_report
-    from .evaluation.closed_loop_report import examine_all, plain
+    from .evaluation.closed_loop_report import examine, examine_agents, plain
 
-    names = names_in([agents])
-    reports, notes = examine_all(
-        tasks_in(task or ["Heading"]), names,
-        path=agent_path, runs=runs, points=points, starts=starts, directions=directions,
-    )  # fmt: skip
+    examined = partial(examine, points=points, starts=starts, directions=directions)
+    reports, notes = examine_agents(
+        tasks_in(task or ["Heading"]), names_in([agents]), examined, path=agent_path, runs=runs
+    )
     if as_json:
         typer.echo(dumps([plain(report) for report in reports], indent=2, allow_nan=False))
     else:
@@ -376,17 +409,25 @@ def capture(
     runs: Runs = Path("runs"),
     starts: Annotated[int, Option(help="In the box of starts.")] = 1024,
     points: Annotated[int, Option(help="To a side of the picture's plane.")] = 61,
-    friction_limit: Annotated[list[float] | None, Option(help="Largest ratio of tangential to normal force; several may be given. The tasks' own is "
-        "inf.", show_default=False)] = None,
+    friction_limit: Annotated[list[float] | None, Option(help="Largest ratio of tangential to normal force; the task's own by default. May be "
+        "repeated.", show_default=False)] = None,
     as_json: AsJson = False,
 ) -> None:  # fmt: skip
     """Hold agents against what can be saved: an exhaustive search over two chosen steps, each followed by the paper's controller."""
-    from .evaluation.capture import examine_captures, show, write_captures
+    from .evaluation.capture import examine_capture, show, write_captures
+    from .evaluation.closed_loop_report import examine_agents
 
-    reports, notes = examine_captures(
-        tasks_in(task or ["Metastable"]), names_in([agents]), path=agent_path, runs=runs,
-        starts=starts, points=points, friction_limits=friction_limit or [float("inf")],
-    )  # fmt: skip
+    reports, notes = [], {}
+    for limit in friction_limit or [None]:
+        examined = partial(examine_capture, friction_limit=limit, starts=starts, points=points)
+        found, left_out = examine_agents(
+            tasks_in(task or ["Metastable"]),
+            names_in([agents]),
+            examined,
+            path=agent_path,
+            runs=runs,
+        )
+        reports, notes = reports + found, notes | left_out
     if as_json:
         typer.echo(dumps([row for each in reports for row in each.rows()], indent=2))
     else:

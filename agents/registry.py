@@ -95,7 +95,22 @@ def _lqr(request: AgentRequest) -> Agent:
 
 
 def _mpc(request: AgentRequest) -> Agent:
-    return MpcController(task_of(request.env_id), request.options, seed=request.seed)
+    task, base = task_of(request.env_id), make_base(request)[1]
+    return MpcController(task, request.options, base, seed=request.seed)
+
+
+def make_base(request: AgentRequest) -> tuple[str, Agent]:
+    """The agent that planners deviate from, with its name: the package's PPO; without one for these observations the regulator, or without a gait the
+    fixed controller."""
+    task = task_of(request.env_id)
+    for seed in shipped_seeds(request.env_id, "ppo")[:1]:
+        policy = load(shipped_folder(request.env_id, "ppo", seed), env_id=request.env_id)
+        if policy.card.layout == ObservationLayout.of(task, request.options):
+            return "ppo", policy
+    try:
+        return "lqr", guided(task, request.options)
+    except NoGaitError:
+        return "fixed", FixedController()
 
 
 def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:

@@ -9,7 +9,16 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
-from agents.evaluation.intervals import RESAMPLES, holm, resample, share_estimate
+from agents.evaluation import intervals
+from agents.evaluation.intervals import (
+    RESAMPLES,
+    equal_rates_p_value,
+    holm,
+    resample,
+    resample_time_per_fall,
+    share_estimate,
+    time_per_fall_estimate,
+)
 
 RNG_SEED = 7
 
@@ -137,3 +146,73 @@ def test_holm_s_correction_is_that_of_its_definition():
     assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
     assert holm([0.6, 0.7]) == [1.0, 1.0]
     assert holm([]) == []
+
+
+def walks(mean: float, horizon: float, trainings: int, episodes: int, seed: int = RNG_SEED):
+    """Times and falls of walkers that fall at random, after a mean time, cut at a horizon."""
+    times = np.random.default_rng(seed).exponential(mean, (trainings, episodes))
+    return np.minimum(times, horizon), (times < horizon).astype(float)
+
+
+def test_draws_do_not_depend_on_how_many_are_made_at_a_time(monkeypatch):
+    values = normal(3, 50)
+    whole = resample(values, 1)
+    monkeypatch.setattr(intervals, "_BLOCK", 150 * 7)
+    parts = resample(values, 1)
+    # the same numbers, summed in another order
+    assert parts.means == pytest.approx(whole.means, rel=1e-13)
+    assert parts.iqms == pytest.approx(whole.iqms, rel=1e-13)
+
+
+def test_every_draw_of_episodes_has_as_many_as_there_are():
+    for trainings, episodes in intervals._draws((3, 20), 0, 50):
+        assert (trainings.sum(axis=1) == 3).all() and (episodes.sum(axis=1) == 20).all()
+
+
+def test_the_time_per_fall_of_walks_that_are_cut_is_still_the_mean_time_to_a_fall():
+    covered = 0
+    for seed in range(200):
+        # nine walks of ten are cut
+        estimate = time_per_fall_estimate(*walks(1000.0, 100.0, 1, 200, seed))
+        covered += estimate.low <= 3.0 <= estimate.high
+    # the interval is exact or wide: of 200 samples 190 +- 3.1 are covered, or more
+    assert covered >= 180
+
+
+def test_the_interval_of_the_time_per_fall_is_garwood_s():
+    # Garwood (1936), table 1: 10 events have the 95 % limits 4.795 and 18.39
+    times, falls = np.full((1, 20), 50.0), np.repeat([[1.0, 0.0]], 10, axis=0).reshape(1, 20)
+    value, low, high = time_per_fall_estimate(times, falls)
+    assert value == pytest.approx(2.0, abs=1e-12)
+    assert (1000.0 / 10.0**high, 1000.0 / 10.0**low) == pytest.approx((4.795, 18.39), rel=1e-3)
+
+
+def test_without_a_fall_there_is_a_lower_bound_alone():
+    value, low, high = time_per_fall_estimate(np.full((2, 10), 50.0), np.zeros((2, 10)))
+    assert np.isnan(value) and np.isnan(high)
+    # no event: the upper limit of the number is -ln 0.025 = 3.689
+    assert low == pytest.approx(np.log10(1000.0 / -np.log(0.025)), abs=1e-12)
+
+
+def test_the_interval_of_the_time_per_fall_is_as_wide_as_trainings_differ():
+    alike = walks(100.0, 1000.0, 5, 400)
+    pooled = time_per_fall_estimate(*(each.reshape(1, -1) for each in alike))
+    # drawing both ways counts the noise of each episode up to three times, as of a mean
+    assert width(pooled) <= width(time_per_fall_estimate(*alike)) < 1.8 * width(pooled)
+    one, other = walks(50.0, 1000.0, 2, 400), walks(500.0, 1000.0, 2, 400)
+    apart = time_per_fall_estimate(*(np.concatenate(each) for each in zip(one, other, strict=True)))
+    assert width(apart) > 5.0 * width(pooled)
+
+
+def test_a_draw_without_a_fall_is_finite():
+    times, falls = np.full((1, 5), 10.0), np.array([[1.0, 0.0, 0.0, 0.0, 0.0]])
+    drawn = resample_time_per_fall(times, falls)
+    assert drawn.mean == pytest.approx(np.log10(50.0), abs=1e-12)
+    assert drawn.means.max() == pytest.approx(np.log10(100.0), abs=1e-12)
+
+
+def test_the_test_of_equal_rates_is_the_binomial_one():
+    # 5 falls and none in equal times: twice 1 / 2^5
+    assert equal_rates_p_value((100.0, 100.0), (5.0, 0.0)) == pytest.approx(2.0 / 2**5)
+    assert equal_rates_p_value((100.0, 300.0), (1.0, 3.0)) == 1.0
+    assert equal_rates_p_value((100.0, 300.0), (0.0, 0.0)) == 1.0

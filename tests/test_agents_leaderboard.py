@@ -20,15 +20,28 @@ from agents.evaluation.comparison import (
     compared_rows,
     rivals_of,
 )
-from agents.evaluation.episodes import RETURN, SURVIVAL, Episodes, Results, direction, is_share
+from agents.evaluation.episodes import (
+    FELL,
+    RETURN,
+    SURVIVAL,
+    TIME,
+    TIME_PER_FALL,
+    Episodes,
+    Results,
+    direction,
+    is_share,
+    metric_row,
+)
 from agents.evaluation.leaderboard import (
     leaderboard_page,
     level_candidates,
     level_rows,
     make_leaderboard,
 )
+from agents.evaluation.pictures import save_leaderboard_plot, save_push_levels_plot
 from agents.evaluation.plan import Candidate, Evaluation
 from agents.evaluation.recording import record_episode
+from agents.evaluation.row_tables import rows_to_csv
 from agents.evaluation.scoring import run_episodes
 from agents.registry import (
     AGENTS,
@@ -48,6 +61,8 @@ from lean_yaw_env.registration import ENV_IDS, TASK_VERSIONS
 from lean_yaw_env.rendering.palette import AGENT_COLOURS
 
 SHORT = EnvOptions(horizon=8.0)
+ENDLESS = "Metastable"
+"""A task that measures the time to a fall."""
 EPISODES = 6
 
 
@@ -57,7 +72,7 @@ def run_all(candidates: list[Candidate], **arguments) -> list[Results]:
 
 def walked(task: str, agent: str, returns: np.ndarray, **metrics: np.ndarray) -> Results:
     """Results with these values, (trainings, episodes); everything else is one."""
-    names = (RETURN, *task_named(task).metrics)
+    names = (RETURN, *task_named(task).metrics, TIME, FELL)
     given = {RETURN: returns} | metrics
     runs = [
         Episodes(
@@ -97,9 +112,9 @@ SAMPLES = named(
 def test_every_task_has_a_headline_with_a_direction():
     for name in TASK_VERSIONS:
         task = task_named(name)
-        if task.headline != RETURN:
+        if task.headline not in (RETURN, TIME_PER_FALL):
             assert task.metrics[task.headline].better is not None
-    assert is_share("Metastable", "survived_200_steps") and is_share("Walk", SURVIVAL)
+    assert is_share("WaypointGoal", "is_success") and is_share("Walk", SURVIVAL)
     assert not is_share("Waypoint", "goals")
 
 
@@ -279,12 +294,73 @@ def test_two_processes_give_the_results_of_one(monkeypatch):
         assert np.array_equal(one.values(RETURN), two.values(RETURN))
 
 
-def test_push_levels_are_walked_by_the_agents_of_push_alone():
-    push = Candidate("Metastable", "fixed", EPISODES, SHORT)
-    candidates = level_candidates([push, Candidate("Walk", "fixed", EPISODES, SHORT)], (0.1, 2.0))
+def test_push_levels_are_walked_by_the_agents_of_one_task_alone():
+    own = Candidate(ENDLESS, "fixed", EPISODES, SHORT)
+    candidates = level_candidates([own, Candidate("Walk", "fixed", EPISODES, SHORT)], (0.1, 2.0))
     assert [each.options.push_level for each in candidates] == [0.1, 2.0]
-    rows = level_rows(run_all([push, *candidates]))
-    assert list(rows) == sorted([0.1, task_named("Metastable").push_level, 2.0])
+    rows = level_rows(run_all([own, *candidates]))
+    assert list(rows) == sorted([0.1, task_named(ENDLESS).push_level, 2.0])
+    assert all(row.metric == TIME_PER_FALL for of_level in rows.values() for row in of_level)
+
+
+def test_the_time_per_fall_is_that_of_the_episodes():
+    (found,) = run_all([Candidate(ENDLESS, "fixed", 40, EnvOptions(horizon=15.0))])
+    times, fell = found.values(TIME)[0], found.values(FELL)[0]
+    assert 0 < fell.sum() < 40
+    assert np.array_equal(fell == 1.0, found.values(SURVIVAL)[0] == 0.0)
+    assert (times[fell == 0.0] >= 15.0).all() and (times[fell == 1.0] < 15.0).all()
+    row = metric_row(found, TIME_PER_FALL)
+    assert 10.0**row.mean == pytest.approx(times.sum() / fell.sum(), rel=1e-12)
+    assert row.low < row.mean < row.high and row.episodes == 40
+
+
+def test_walks_until_a_fall_are_cut_sooner_than_their_task_cuts_them():
+    evaluation = Evaluation(episodes=1000, progress=False)
+    (own,) = evaluation.candidates([ENDLESS], ["lqr"])
+    assert (own.episodes, own.options.horizon) == (plan.LONG_EPISODES, plan.LONG_HORIZON)
+    assert evaluation.candidates([ENDLESS], ["mpc"])[0].episodes == plan.LONG_COSTLY_EPISODES
+    (other,) = evaluation.candidates(["Walk"], ["lqr"])
+    assert (other.episodes, other.options) == (1000, EnvOptions())
+    given = Evaluation(options=SHORT, progress=False)
+    assert given.candidates([ENDLESS], ["lqr"])[0].options == SHORT
+
+
+def fallen(agent: str, mean: float, episodes: int = 60, trainings: int = 1) -> Results:
+    """Walks of an agent that falls after a mean time, cut at 100; of an infinite one, never."""
+    times = np.random.default_rng(1).exponential(1.0, (trainings, episodes)) * mean
+    fell = (times < 100.0).astype(float)
+    return walked(
+        ENDLESS, agent, np.minimum(times, 100.0), time=np.minimum(times, 100.0), fell=fell
+    )
+
+
+def test_who_falls_less_often_is_better_however_few_fall():
+    results = {ENDLESS: named(*(fallen(*each) for each in (("lqr", 50.0), ("ppo", 200.0), ("sac", np.inf))))}  # fmt: skip
+    claims = {each.better: each for each in claims_of(results, {ENDLESS: "lqr"})}
+    assert claims["ppo"].holds and claims["sac"].holds
+    assert claims["ppo"].comparison.mean.value == pytest.approx(np.log10(4.0), abs=0.2)
+    assert np.isfinite(claims["sac"].comparison.mean).all()
+    few = {ENDLESS: named(fallen("lqr", 5000.0), fallen("ppo", np.inf))}
+    fell = few[ENDLESS]["lqr"].values(FELL).sum()
+    assert 0 < fell < 5  # too few to say anything
+    assert claims_of(few, {ENDLESS: "lqr"})[0].verdict == "tie"
+    assert best_feedback(named(fallen("lqr", 50.0), fallen("feedback", 20.0))) == "lqr"
+
+
+def test_an_agent_that_never_falls_has_a_bound_and_no_infinity_anywhere(tmp_path):
+    results = {ENDLESS: named(fallen("lqr", 50.0), fallen("ppo", np.inf, trainings=2))}
+    rows, claims = compared_rows(results, {ENDLESS: "lqr"})
+    page = leaderboard_page(rows, claims, {0.5: rows[:1]}, {}, "Made by a test.")
+    bound = np.log10(2 * 60 * 100.0 / -np.log(0.025))
+    assert f"| ≥ {bound:.3f} |" in page and "log10 time per fall ↑" in page
+    text = rows_to_csv(rows)
+    assert "inf" not in text and "inf" not in page.lower().replace("information", "")
+    row = next(row for row in csv.DictReader(text.splitlines()) if row["agent"] == "ppo")
+    assert (row["metric"], row["mean"], row["high"]) == (TIME_PER_FALL, "", "")
+    assert float(row["low"]) == pytest.approx(bound)
+    assert row["verdict"] == "better"
+    save_leaderboard_plot(rows, tmp_path / "board.png")
+    save_push_levels_plot({0.5: rows[:1], 1.0: [row for row in rows if row.agent == "ppo"][:1]}, tmp_path / "levels.png")  # fmt: skip
 
 
 def test_a_recorded_episode_keeps_goals_and_path():
@@ -340,14 +416,15 @@ def test_the_leaderboard_holds_every_agent_and_the_command_that_made_it(tmp_path
         "## Metastable",
         "| random | baseline |",
         "random < fixed",
-        "0.2 | 0.4",
+        "| 0.5 | 0.7",
     ):
         assert words in page
     with open(tmp_path / "docs" / "leaderboard.csv", newline="") as file:
         assert len(list(csv.DictReader(file))) == len(rows)
     images = {path.name for path in (tmp_path / "docs" / "images").iterdir()}
     assert images == {
-        "leaderboard.png", "push_levels.png", "footprints_walk.png", "footprints_push.png", "capture_walk.png", "capture_metastable.png"
+        "leaderboard.png", "push_levels.png", "footprints_walk.png", "footprints_metastable.png", "capture_walk.png",
+        "capture_metastable.png"
     }  # fmt: skip
     assert "(images/capture_metastable.png)" in page
 
@@ -393,13 +470,6 @@ def test_pictures_alone_are_drawn_by_one_option(tmp_path: Path):
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
     assert [path.name for path in tmp_path.iterdir()] == ["footprints_waypoint.png"]
-
-
-def test_level_rows_are_written_once_for_each_agent_and_level():
-    rows = level_rows(run_all([Candidate("Metastable", "fixed", 2, SHORT)]))
-    ((level, (row,)),) = rows.items()
-    assert level == task_named("Metastable").push_level
-    assert row.metric == "survived_200_steps"
 
 
 def test_bad_numbers_and_runs_of_other_episodes_are_refused():

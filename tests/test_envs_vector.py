@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import multiprocessing
 import pickle
 import warnings
@@ -27,7 +28,12 @@ from lean_yaw_env.envs.walker_env import WalkerEnv
 
 N = 5
 MODES = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP, AutoresetMode.DISABLED)
-RESTLESS: dict[str, Any] = {"start_disturbance": 3.0, "max_offset_change": 0.1, "horizon": 12.0}
+RESTLESS: dict[str, Any] = {
+    "start_disturbance": 3.0,
+    "max_offset_change": 0.1,
+    "horizon": 12.0,
+    "friction_limit": math.inf,
+}
 """Some episodes fall within a few steps, the others are truncated after some fifteen."""
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -15,22 +13,19 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
-from tqdm import tqdm
 
 from lean_yaw_env.analysis import Choices, capture
 from lean_yaw_env.analysis.attraction import section_grid
 from lean_yaw_env.analysis.many_walks import walk_many
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
-from lean_yaw_env.errors import LeanYawError
 from lean_yaw_env.files import write_text
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, STATE_SIZE, Vector
-from lean_yaw_env.rendering.figures import new_figure, save_figure
-from lean_yaw_env.validation import require_count, require_number
+from lean_yaw_env.rendering.figures import panels, save_figure
+from lean_yaw_env.validation import require_count
 from lean_yaw_env.walker import Walker
 
 from ..agent import Agent
-from ..registry import AgentRequest, env_id_of, make_agent
 from .closed_loop_interface import closed_loop
 from .closed_loop_report import axes_around_start, box_starts
 from .row_tables import IMAGES, csv_table
@@ -97,13 +92,13 @@ def examine_capture(
     agent: Agent,
     task: str,
     *,
-    friction_limit: float = float("inf"),
+    friction_limit: float | None = None,
     starts: int = 1024,
     points: int = 61,
 ) -> CaptureReport:
     """Hold an agent against the exhaustive search, from the same starts for every agent of a task.
 
-    Without a friction limit the floor is that of the tasks, on which the agents were trained. Commands are as many as the environment lets an agent choose from: its ranges, and the largest change of the offset in a step.
+    Without a friction limit the floor is the task's own. Commands are as many as the environment lets an agent choose from: its ranges, and the largest change of the offset in a step.
 
     Raises
     ------
@@ -114,7 +109,6 @@ def examine_capture(
     """
     require_count("starts", starts, 1, 1_000_000)
     require_count("points", points, 2, 2000)
-    require_number("friction_limit", friction_limit, 0.0, float("inf"), "(]")
     loop = closed_loop(agent, task, EnvOptions(friction_limit=friction_limit))
     axes, plane = section_grid(loop, axes_around_start(loop, PLANE, points), loop.start)
     everything = np.concatenate([box_starts(loop, starts), plane])
@@ -123,7 +117,7 @@ def examine_capture(
     least = _least_steps(loop.walker, task, bare.tobytes())
     shape = (points, points)
     return CaptureReport(
-        task, name, friction_limit, least[:starts], walks.survived[:starts],
+        task, name, loop.walker.parameters.friction_limit, least[:starts], walks.survived[:starts],
         least[starts:].reshape(shape), walks.survived[starts:].reshape(shape), (axes[PLANE[0]], axes[PLANE[1]]),
     )  # fmt: skip
 
@@ -145,42 +139,6 @@ def _least_steps(walker: Walker, task: str, states: bytes) -> NDArray[np.int64]:
     return found.least_steps
 
 
-def examine_captures(
-    tasks: Sequence[str],
-    names: Sequence[str],
-    *,
-    path: Path | None,
-    runs: Path,
-    friction_limits: Sequence[float],
-    starts: int,
-    points: int,
-) -> tuple[list[CaptureReport], dict[str, str]]:
-    """Examine agents at tasks, with a progress bar; the reports, and by "task: agent" why one is left out of several.
-
-    Raises
-    ------
-    ValueError
-        If an agent is unknown, remembers or draws, or a number is out of its range.
-    """
-    reports: list[CaptureReport] = []
-    notes: dict[str, str] = {}
-    wanted = list(product(tasks, friction_limits, names))
-    for task, limit, name in tqdm(wanted, desc="capturability", unit="agent", file=sys.stderr):
-        request = AgentRequest(env_id_of(task), EnvOptions(), path=path, runs=runs)
-        try:
-            agent = make_agent(name, request)
-            reports.append(
-                examine_capture(
-                    name, agent, task, friction_limit=limit, starts=starts, points=points
-                )
-            )
-        except (ValueError, LeanYawError) as error:
-            if len(wanted) == 1:
-                raise
-            notes[f"{task}: {name}"] = str(error)
-    return reports, notes
-
-
 def write_captures(reports: Sequence[CaptureReport], out: Path) -> list[Path]:
     """Write capture.csv and a picture for each task and friction limit into a folder; return the paths."""
     (out / IMAGES).mkdir(parents=True, exist_ok=True)
@@ -190,14 +148,21 @@ def write_captures(reports: Sequence[CaptureReport], out: Path) -> list[Path]:
 
 
 def save_captures(reports: Sequence[CaptureReport], images: Path) -> list[Path]:
-    """Write a picture for each task and friction limit, ``capture_<task>.png`` without a limit; return the paths."""
+    """Write a picture for each task and friction limit; return the paths."""
     paths: list[Path] = []
     for task, limit in dict.fromkeys((report.task, report.friction_limit) for report in reports):
-        floor = "" if limit == float("inf") else f"_friction_{limit:g}"
-        paths.append(images / f"capture_{task.lower()}{floor}.png")
+        paths.append(images / picture_name(task, limit))
         these = [each for each in reports if (each.task, each.friction_limit) == (task, limit)]
         save_capture(these, paths[-1])
     return paths
+
+
+def picture_name(task: str, limit: float | None = None) -> str:
+    """The file of a task's picture for a friction limit, the task's own if none is given; ``capture_<task>.png`` without any."""
+    if limit is None:
+        limit = EnvOptions().walker_parameters(task_named(task)).friction_limit
+    floor = "" if limit == float("inf") else f"_friction_{limit:g}"
+    return f"capture_{task.lower()}{floor}.png"
 
 
 def show(reports: Sequence[CaptureReport], notes: dict[str, str]) -> None:
@@ -239,24 +204,17 @@ def _kind(report: CaptureReport) -> NDArray[np.int64]:
 
 def save_capture(reports: Sequence[CaptureReport], path: Path) -> None:
     """Draw where each agent of a task saves states of the plane and where it loses some that could be saved."""
-    columns = min(len(reports), 5)
-    rows = -(-len(reports) // columns)
-    figure = new_figure(2.7 * columns + 0.8, 2.8 * rows + 1.4)
-    axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+    figure, places = panels(len(reports), 5, (2.7, 2.8), (0.8, 1.4), sharex=True, sharey=True)
     colours = ListedColormap([colour for _, colour in _KINDS])
     norm = BoundaryNorm(np.arange(len(_KINDS) + 1) - 0.5, len(_KINDS))
-    for place in axes.flat[len(reports) :]:
-        place.set_axis_off()
-    for place, report in zip(axes.flat, reports, strict=False):
+    for place, report in zip(places, reports, strict=True):
         x, y = report.plane
         place.pcolormesh(x, y, _kind(report).T, cmap=colours, norm=norm)
         place.plot(x.mean(), y.mean(), marker="+", color="black", markersize=9)
         can = report.plane_least_steps <= MOST_STEPS
         place.set_title(f"{report.agent}: {report.plane_is_saved[can].mean():.0%}")
-    for place in axes[-1]:
-        place.set_xlabel("ankle angle (rad)")
-    for place in axes[:, 0]:
-        place.set_ylabel("ankle rate (rad / time unit)")
+        place.set(xlabel="ankle angle (rad)", ylabel="ankle rate (rad / time unit)")
+        place.label_outer()
     limit = reports[0].friction_limit
     floor = "" if limit == float("inf") else f", friction limit {limit:g}"
     figure.suptitle(

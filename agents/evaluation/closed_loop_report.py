@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,7 @@ ZERO = 1e-3
 _ARRIVED = 1e-9
 
 Cell = str | float | bool | None
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -104,31 +105,35 @@ def examine(
     )
 
 
-def examine_all(
-    tasks: Sequence[str], names: Sequence[str], *, path: Path | None, runs: Path, **sizes: int
-) -> tuple[list[ClosedLoopReport], dict[str, str]]:
-    """Examine agents at tasks, with a progress bar; the reports, and by "task: agent" why one is left out.
+def examine_agents(
+    tasks: Sequence[str],
+    names: Sequence[str],
+    examined: Callable[[str, Agent, str], Found],
+    *,
+    path: Path | None,
+    runs: Path,
+) -> tuple[list[Found], dict[str, str]]:
+    """What is found of each agent at each task, with a progress bar; and by "task: agent" why one is left out.
 
-    Of several tasks, an agent that is not for a task is left out there. ``sizes`` are the points, starts and directions of ``examine``.
+    ``examined`` gets an agent's name, the agent and the task's name.
 
     Raises
     ------
-    ValueError
-        If an agent is unknown, remembers or draws, or a number is out of its range.
+    ValueError, LeanYawError
+        The last reason if all are left out.
     """
-    made: list[tuple[str, str, Agent]] = []
+    found: list[Found] = []
     notes: dict[str, str] = {}
-    for task in tasks:
+    wanted = [(task, name) for task in tasks for name in names]
+    for task, name in tqdm(wanted, desc="examining", unit="agent", file=sys.stderr):
         request = AgentRequest(env_id_of(task), EnvOptions(), path=path, runs=runs)
-        for name in names:
-            try:
-                made.append((task, name, make_agent(name, request)))
-            except (ValueError, LeanYawError) as error:
-                if len(tasks) == 1:
-                    raise
-                notes[f"{task}: {name}"] = str(error)
-    bar = tqdm(made, desc="closed loops", unit="agent", file=sys.stderr)
-    return [examine(name, agent, task, **sizes) for task, name, agent in bar], notes
+        try:
+            found.append(examined(name, make_agent(name, request), task))
+        except (ValueError, LeanYawError) as error:
+            notes[f"{task}: {name}"] = str(error)
+            if len(notes) == len(wanted):
+                raise
+    return found, notes
 
 
 def basin_around_start(loop: ClosedLoopMap, x: str, y: str, points: int) -> xarray.Dataset:

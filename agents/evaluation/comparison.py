@@ -12,8 +12,8 @@ import numpy as np
 from lean_yaw_env.envs.tasks import task_named
 
 from ..registry import AGENTS
-from .episodes import Results, Row, direction, is_share, metric_row
-from .intervals import CONFIDENCE, UNDEFINED, Estimate, holm
+from .episodes import TIME_PER_FALL, Results, Row, direction, is_share, metric_row
+from .intervals import CONFIDENCE, UNDEFINED, Estimate, equal_rates_p_value, holm
 
 Verdict = Literal["better", "worse", "tie", "mixed"]
 ResultsByAgent = Mapping[str, Results]
@@ -44,8 +44,8 @@ def best_feedback(results: ResultsByAgent) -> str | None:
         return None
     task = results[names[0]].task
     headline = task_named(task).headline
-    means = {name: float(np.nanmean(results[name].values(headline))) for name in names}
-    return max(names, key=lambda name: direction(task, headline) * means[name])
+    sign = direction(task, headline)
+    return max(names, key=lambda name: sign * results[name].resampled(headline).mean)
 
 
 def rivals_of(results: Mapping[str, ResultsByAgent]) -> dict[str, str | None]:
@@ -61,16 +61,22 @@ class Comparison(NamedTuple):
     iqm: Estimate
     """The difference of the interquartile means; NaN for a share."""
     p_value: float
-    """Two-sided, of the means being equal; no smaller than a sign test's can be on so few episodes."""
+    """Two-sided, of the means being equal; no smaller than a sign test's can be on so few episodes, nor than that of equal rates of falls."""
     episodes: int
 
 
 def compare(first: Results, second: Results, metric: str) -> Comparison:
-    """Compare two agents in a metric."""
+    """Compare two agents in a metric; of the time per fall, one that never falls counts half a fall."""
     episodes = min(first.episodes, second.episodes)
     difference = first.resampled(metric, episodes).less(second.resampled(metric, episodes))
     iqm = UNDEFINED if is_share(first.task, metric) else difference.iqm_estimate()
     p_value = max(difference.p_value(), 2.0 ** (1 - episodes))
+    if metric == TIME_PER_FALL:
+        # the bootstrap draws trainings too, but knows little of falls that are few
+        sums = zip(
+            *([each.sum() for each in one.falls(episodes)] for one in (first, second)), strict=True
+        )
+        p_value = max(p_value, equal_rates_p_value(*sums))
     return Comparison(difference.mean_estimate(), iqm, p_value, episodes)
 
 
@@ -160,7 +166,9 @@ def _compared(row: Row, mine: Results, rival: Results | None) -> Row:
     """The row with its difference from the rival's, where that means something."""
     if rival is None or rival is mine or direction(row.task, row.metric) == 0:
         return row
-    if not all(np.isfinite(each.values(row.metric)).all() for each in (mine, rival)):
+    if row.metric != TIME_PER_FALL and not all(
+        np.isfinite(each.values(row.metric)).all() for each in (mine, rival)
+    ):
         return row
     value, low, high = compare(mine, rival, row.metric).mean
     return replace(

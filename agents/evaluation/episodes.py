@@ -14,11 +14,33 @@ from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import Vector
 
-from .intervals import CLAIM_RESAMPLES, RESAMPLES, UNDEFINED, Resampled, resample, share_estimate
+from .intervals import (
+    CLAIM_RESAMPLES,
+    RESAMPLES,
+    UNDEFINED,
+    Resampled,
+    resample,
+    resample_time_per_fall,
+    share_estimate,
+    time_per_fall_estimate,
+)
 
 RETURN = "return"
 SPEED = "speed"
 SURVIVAL = "survival"
+TIME, FELL = "time", "fell"
+TIME_PER_FALL = "time_per_fall"
+"""The headline of tasks without an end: log10 of the time of all walks over their number of falls."""
+
+
+def metric_names(task: str) -> tuple[str, ...]:
+    """What is known of every episode of a task: ``Episodes.metrics``."""
+    return (RETURN, *task_named(task).metrics, SPEED, TIME, FELL)
+
+
+def words(metric: str) -> str:
+    """A metric's name as people read it."""
+    return ("log10 " if metric == TIME_PER_FALL else "") + metric.replace("_", " ")
 
 
 @dataclass(frozen=True)
@@ -28,7 +50,8 @@ class Episodes:
     survived: NDArray[np.bool_]
     """Whether the time limit or a success ended it."""
     metrics: dict[str, Vector]
-    """``return``, the task's metrics and ``speed`` (distance over time) by name; NaN where an episode leaves one undefined."""
+    """``return``, the task's metrics, ``speed`` (distance over time), ``time`` and ``fell`` (0 or 1; a solver's failure is no fall) by name; NaN where an
+    episode leaves one undefined."""
 
     @classmethod
     def joined(cls, parts: Sequence[Episodes]) -> Episodes:
@@ -66,13 +89,18 @@ class Results:
 
     @property
     def metrics(self) -> tuple[str, ...]:
-        return (*self.runs[0].metrics, SURVIVAL)
+        first = (TIME_PER_FALL,) if task_named(self.task).headline == TIME_PER_FALL else ()
+        return (*first, *self.runs[0].metrics, SURVIVAL)
 
     def values(self, metric: str) -> Vector:
         """Shape (trainings, episodes); ``survival`` is 0 or 1."""
         if metric == SURVIVAL:
             return np.stack([run.survived for run in self.runs]).astype(float)
         return np.stack([run.metrics[metric] for run in self.runs])
+
+    def falls(self, episodes: int | None = None) -> tuple[Vector, Vector]:
+        """Time walked and number of falls in each of the first episodes, or all: shapes (trainings, episodes)."""
+        return self.values(TIME)[:, :episodes], self.values(FELL)[:, :episodes]
 
     def resampled(self, metric: str, episodes: int | None = None) -> Resampled:
         """Resamples of a metric's values in the first episodes, or all; drawn once."""
@@ -82,7 +110,10 @@ class Results:
             stream = zlib.crc32(self.agent.encode())
             is_claimed = metric == task_named(self.task).headline
             resamples = CLAIM_RESAMPLES if is_claimed else RESAMPLES
-            drawn = resample(self.values(metric)[:, :count], stream, resamples)
+            if metric == TIME_PER_FALL:
+                drawn = resample_time_per_fall(*self.falls(count), stream, resamples)
+            else:
+                drawn = resample(self.values(metric)[:, :count], stream, resamples)
             self._resampled[metric, count] = drawn
         return self._resampled[metric, count]
 
@@ -95,12 +126,12 @@ class Row:
 
     Attributes
     ----------
-    mean, low, high : the mean, for a metric that is 0 or 1 the share, with its 95 % interval
+    mean, low, high : the mean, for a metric that is 0 or 1 the share, with its 95 % interval; of ``time_per_fall`` without a fall the low end alone
     survival : share of the episodes that the time limit or a success ended
     episodes : of each training
     iqm, iqm_low, iqm_high : the interquartile mean with its 95 % interval; NaN for a share
     trainings : policies of as many trainings are pooled; 1 for what is not trained
-    least_training, greatest_training : the lowest and the highest mean of a training
+    least_training, greatest_training : the lowest and the highest mean of a training, of those that have one
     against : the feedback controller that it is compared with, on the episodes that both have walked
     difference, difference_low, difference_high : the mean less that agent's, with its 95 % interval; NaN where there is no comparison
     p_value : of the difference being zero, of the task's headline only; corrected for the number of claims (Holm)
@@ -128,6 +159,11 @@ class Row:
     p_value: float = math.nan
     verdict: str | None = None
 
+    @property
+    def score(self) -> float:
+        """The mean, or what it is at least."""
+        return self.low if math.isnan(self.mean) else self.mean
+
 
 def is_share(task: str, metric: str) -> bool:
     """Whether a metric is 0 or 1 for an episode."""
@@ -137,7 +173,7 @@ def is_share(task: str, metric: str) -> bool:
 
 def direction(task: str, metric: str) -> int:
     """+1 for a metric of which more is better, -1 for one of which less is, 0 for one that only describes."""
-    if metric in (RETURN, SURVIVAL):
+    if metric in (RETURN, SURVIVAL, TIME_PER_FALL):
         return 1
     known = task_named(task).metrics.get(metric)
     better = None if known is None else known.better
@@ -151,14 +187,21 @@ def summary(results: Results) -> list[Row]:
 
 def metric_row(results: Results, metric: str) -> Row:
     """The row of a metric, compared with no one."""
-    values = results.values(metric)
-    if is_share(results.task, metric):
-        mean, iqm = share_estimate(values > 0.0), UNDEFINED
+    if metric == TIME_PER_FALL:
+        times, falls = results.falls()
+        mean, iqm = time_per_fall_estimate(times, falls), UNDEFINED
+        each = zip(times[:, None], falls[:, None], strict=True)
+        means = [time_per_fall_estimate(*training).value for training in each]
     else:
-        drawn = results.resampled(metric)
-        mean, iqm = drawn.mean_estimate(), drawn.iqm_estimate()
-    defined = [run[np.isfinite(run)] for run in values]
-    means = [float(run.mean()) if len(run) else math.nan for run in defined]
+        values = results.values(metric)
+        if is_share(results.task, metric):
+            mean, iqm = share_estimate(values > 0.0), UNDEFINED
+        else:
+            drawn = results.resampled(metric)
+            mean, iqm = drawn.mean_estimate(), drawn.iqm_estimate()
+        defined = [run[np.isfinite(run)] for run in values]
+        means = [float(run.mean()) if len(run) else math.nan for run in defined]
+    known = [each for each in means if math.isfinite(each)] or [math.nan]
     return Row(
         results.task,
         results.agent,
@@ -167,7 +210,7 @@ def metric_row(results: Results, metric: str) -> Row:
         float(results.values(SURVIVAL).mean()),
         results.episodes,
         *iqm,
-        len(values),
-        min(means),
-        max(means),
+        len(results.runs),
+        min(known),
+        max(known),
     )

@@ -22,6 +22,7 @@ from tqdm import tqdm
 
 import lean_yaw_env
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.files import written_whole
 from lean_yaw_env.reporting import uninterrupted
 from lean_yaw_env.validation import require_count
@@ -40,11 +41,13 @@ from ..registry import (
 from ..seeds import MOST_EPISODES, EpisodeSet, first_seed
 from .comparison import kind_of
 from .entries import is_entry, load_entry, read_entry
-from .episodes import Episodes, Results
+from .episodes import TIME_PER_FALL, Episodes, Results
 from .scoring import run_seeds
 
 _CHUNK = 1024  # episodes run side by side
-_COSTLY_CHUNK = 20  # of an agent that plans: some tens of seconds
+_COSTLY_CHUNK = 5  # of an agent that plans: some seconds
+LONG_EPISODES, LONG_COSTLY_EPISODES, LONG_HORIZON = 400, 20, 4000.0
+"""Of tasks that measure the time to a fall: episodes of each training at most, those of an agent that plans, and the time after which walks are cut."""
 _WORTH_PROCESSES = 2048  # episodes; fewer are run before another process has started
 _METRIC = "metric:"
 _Outcome = tuple[Episodes, float]
@@ -150,19 +153,33 @@ class Evaluation:
             chosen = [name for name in dict.fromkeys(names) if len(tasks) == 1 or name in there]
             for name in chosen if names else there:
                 is_own = own is not None and (name, env_id) == (own.algorithm, own.env_id)
-                found.append(self._candidate(name, task, of_folder if names or is_own else request))
+                found.append(
+                    self._of_registry(name, task, of_folder if names or is_own else request)
+                )
             if entry is not None and task in entry.tasks:
                 found.append(
-                    Candidate(task, entry.name, self.episodes, self.options, entry.trainings, entry.folder)
-                )  # fmt: skip
+                    self._candidate(entry.name, task, entry.trainings, self.options, entry.folder)
+                )
         return found
 
-    def _candidate(self, name: str, task: str, request: AgentRequest) -> Candidate:
-        episodes = min(self.episodes, self.costly_episodes) if _plans(name) else self.episodes
+    def _of_registry(self, name: str, task: str, request: AgentRequest) -> Candidate:
         entry = agent_entry(name)
         folders = policy_folders(name, request) if entry.kind == "learned" else []
         options = entry.needed_options(self.options)
-        return Candidate(task, name, episodes, options, tuple(folders) or (None,))
+        return self._candidate(name, task, tuple(folders) or (None,), options)
+
+    def _candidate(
+        self,
+        name: str,
+        task: str,
+        folders: tuple[Path | None, ...],
+        options: EnvOptions,
+        entry: Path | None = None,
+    ) -> Candidate:
+        most = [self.episodes, self.costly_episodes if _plans(name) else MOST_EPISODES]
+        if task_named(task).headline == TIME_PER_FALL:
+            most.append(LONG_COSTLY_EPISODES if _plans(name) else LONG_EPISODES)
+        return Candidate(task, name, min(most), evaluated_options(task, options), folders, entry)
 
     def run(self, candidates: Sequence[Candidate]) -> list[Results]:
         """Let every candidate run the episodes of the seed; the same ones at the same task.
@@ -193,6 +210,12 @@ class Evaluation:
             for folder in candidate.folders
             for start in range(0, len(seeds), size)
         ]
+
+
+def evaluated_options(task: str, options: EnvOptions) -> EnvOptions:
+    """The options under which all agents of a task are evaluated: walks until a fall are cut sooner than the task cuts them, unless a horizon is given."""
+    is_long = task_named(task).headline == TIME_PER_FALL and options.horizon is None
+    return replace(options, horizon=LONG_HORIZON) if is_long else options
 
 
 def _plans(agent: str) -> bool:
@@ -228,7 +251,7 @@ def _outcomes(
         for chunk in waiting:
             yield chunk, _run_chunk(chunk, cache)
         return
-    with _pool(min(processes, len(waiting))) as pool:
+    with worker_pool(min(processes, len(waiting))) as pool:
         with uninterrupted():
             futures = {pool.submit(_run_chunk, chunk, cache): chunk for chunk in waiting}
         for future in as_completed(futures):
@@ -236,7 +259,7 @@ def _outcomes(
 
 
 @contextlib.contextmanager
-def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+def worker_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     """Processes of one thread each; at an interruption what has begun ends and is kept, and nothing else begins."""
     before = dict(os.environ)
     os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.files import read_json, write_json
 from lean_yaw_env.parameters import Vector
 
@@ -15,7 +15,8 @@ from ..policies.policy import package_versions
 from ..policies.policy_files import options_to_plain, require_env_id, task_of
 from ..registry import env_id_of
 from ..seeds import EpisodeSet
-from .episodes import RETURN, SPEED, Episodes, Results
+from .episodes import Episodes, Results, metric_names
+from .plan import evaluated_options
 
 FORMAT, FORMAT_VERSION = "lean-yaw-results", 1
 
@@ -47,7 +48,7 @@ def write_results(results: Results, folder: Path, episode_set: EpisodeSet, seed:
 
 
 def read_results(path: Path, episode_set: EpisodeSet, seed: int) -> Results:
-    """Read what ``write_results`` wrote of episodes under the environment's own options.
+    """Read what ``write_results`` wrote of episodes under the options that all agents of a task are evaluated under.
 
     Raises
     ------
@@ -55,14 +56,17 @@ def read_results(path: Path, episode_set: EpisodeSet, seed: int) -> Results:
         If the file is damaged, or of another format, environment, set of episodes or seed.
     """
     record = read_json(path)
-    wanted = {
-        "format": FORMAT, "format_version": FORMAT_VERSION, "options": {}, "episode_set": episode_set, "seed": seed,
-    }  # fmt: skip
-    for key, value in wanted.items():
-        if not isinstance(record, dict) or record.get(key) != value:
-            found = record.get(key) if isinstance(record, dict) else record
-            raise ValueError(f"{key} in {str(path)!r} must be {value!r}, got {found!r}")
+    if not isinstance(record, dict):
+        raise ValueError(f"{str(path)!r} must hold an object, got {record!r}")
     try:
+        task = task_of(require_env_id(record["env_id"]))
+        options = evaluated_options(task, EnvOptions())
+        wanted = {
+            "format": FORMAT, "format_version": FORMAT_VERSION, "options": options_to_plain(options), "episode_set": episode_set, "seed": seed,
+        }  # fmt: skip
+        for key, value in wanted.items():
+            if record[key] != value:
+                raise ValueError(f"{key} in {str(path)!r} must be {value!r}, got {record[key]!r}")
         runs = tuple(
             Episodes(
                 np.array(run["survived"], dtype=np.bool_),
@@ -70,8 +74,7 @@ def read_results(path: Path, episode_set: EpisodeSet, seed: int) -> Results:
             )
             for run in record["trainings"]
         )
-        task = task_of(require_env_id(record["env_id"]))
-        metrics = {RETURN, *task_named(task).metrics, SPEED}
+        metrics = set(metric_names(task))
         if any(
             set(run.metrics) != metrics
             or any(each.shape != run.survived.shape for each in run.metrics.values())
@@ -80,7 +83,7 @@ def read_results(path: Path, episode_set: EpisodeSet, seed: int) -> Results:
             raise ValueError(
                 f"{str(path)!r} must hold {', '.join(sorted(metrics))} of every episode"
             )
-        return Results(task, record["agent"], runs, seconds=float(record["seconds"]))
+        return Results(task, record["agent"], runs, options, float(record["seconds"]))
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"{str(path)!r} is damaged: {error}") from error
 

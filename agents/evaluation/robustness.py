@@ -14,11 +14,11 @@ from matplotlib.axes import Axes
 from lean_yaw_env.envs.options import EnvOptions, TaskOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.files import write_text
-from lean_yaw_env.rendering.figures import new_figure, save_figure
+from lean_yaw_env.rendering.figures import panels, save_figure
 
 from ..policies.policy_files import options_to_plain
 from .comparison import kind_of
-from .episodes import Row, metric_row
+from .episodes import Row, metric_row, words
 from .plan import Candidate, Evaluation
 from .row_tables import IMAGES, bracketed, csv_table, markdown_table, mean, number
 
@@ -97,8 +97,10 @@ def write_robustness(rows: Sequence[VariedRow], out: Path, command: str) -> Path
             [agent, *(bracketed(mean(cells[agent, name])) for name in names)]
             for agent in _distinct(agent for agent, _ in cells)
         ]
-        metric = task_named(task).headline.replace("_", " ")
-        parts += [f"## {task}: {metric}", markdown_table(["agent", *names], lines)]
+        parts += [
+            f"## {task}: {words(task_named(task).headline)}",
+            markdown_table(["agent", *names], lines),
+        ]
     page = out / "robustness.md"
     write_text(page, "\n\n".join(parts) + "\n")
     return page
@@ -119,20 +121,15 @@ def robustness_csv(rows: Sequence[VariedRow]) -> str:
 def save_robustness_picture(rows: Sequence[VariedRow], path: Path) -> None:
     """Draw a panel for each task, an agent to a line and a variation to a column; colours are shares of the best agent's mean in the task as it is."""
     tasks = _distinct(each.row.task for each in rows)
-    columns = min(2, len(tasks))
-    lines = -(-len(tasks) // columns)
-    figure = new_figure(8.0 * columns, 4.2 * lines)
-    places = figure.subplots(lines, columns, squeeze=False).ravel()
-    for task, axes in zip(tasks, places, strict=False):
+    figure, places = panels(len(tasks), 2, (8.0, 4.2), (0.0, 0.0))
+    for task, axes in zip(tasks, places, strict=True):
         _draw_task(axes, task, _cells(rows, task))
-    for axes in places[len(tasks) :]:
-        axes.set_axis_off()
     save_figure(figure, path, dpi=110)
 
 
 def _draw_task(axes: Axes, task: str, cells: Mapping[tuple[str, str], Row]) -> None:
     agents, names = _distinct(agent for agent, _ in cells), _distinct(name for _, name in cells)
-    means = np.array([[cells[agent, name].mean for name in names] for agent in agents])
+    means = np.array([[cells[agent, name].score for name in names] for agent in agents])
     best = means[:, names.index(NOMINAL)].max() if NOMINAL in names else means.max()
     axes.imshow(means / max(best, 1e-9), cmap="viridis", vmin=0.0, vmax=1.0, aspect="auto")
     for (line, column), value in np.ndenumerate(means):
@@ -140,7 +137,7 @@ def _draw_task(axes: Axes, task: str, cells: Mapping[tuple[str, str], Row]) -> N
         axes.text(column, line, number(value), ha="center", va="center", color=colour, fontsize="small")  # fmt: skip
     axes.set_xticks(range(len(names)), names, rotation=30.0, ha="right")
     axes.set_yticks(range(len(agents)), agents)
-    axes.set_title(f"{task}: {task_named(task).headline.replace('_', ' ')}")
+    axes.set_title(f"{task}: {words(task_named(task).headline)}")
 
 
 def _cells(rows: Sequence[VariedRow], task: str) -> dict[tuple[str, str], Row]:

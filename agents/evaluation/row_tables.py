@@ -15,7 +15,7 @@ from rich.table import Table
 
 from lean_yaw_env.envs.tasks import task_named
 
-from .episodes import SURVIVAL, Row, is_share
+from .episodes import SURVIVAL, Row, words
 from .intervals import Estimate
 
 IMAGES = "images"
@@ -65,16 +65,18 @@ def results_table(rows: Sequence[Row]) -> Table:
     for agent in agents:
         table.add_column(agent, justify="right", no_wrap=True)
 
-    def add(metric: str, of: Callable[[Row], Estimate], words: str) -> None:
+    def add(metric: str, of: Callable[[Row], Estimate], title: str) -> None:
         found = [cells.get((agent, metric)) for agent in agents]
-        table.add_row(words, *("" if row is None else _over_interval(of(row)) for row in found))
+        table.add_row(title, *("" if row is None else _over_interval(of(row)) for row in found))
 
     headline = task_named(task).headline
     metrics = dict.fromkeys([headline, SURVIVAL, *(row.metric for row in rows)])
     for metric in metrics:
-        add(metric, mean, metric.replace("_", " "))
-        if metric == SURVIVAL and not is_share(task, headline):
-            add(headline, iqm, f"{headline.replace('_', ' ')}, iqm")
+        add(metric, mean, words(metric))
+        if metric == SURVIVAL and any(
+            math.isfinite(row.iqm) for row in rows if row.metric == headline
+        ):
+            add(headline, iqm, f"{words(headline)}, iqm")
     rival = next((row.against for row in rows if row.verdict), None)
     if rival is not None:
         table.add_section()
@@ -95,13 +97,15 @@ def iqm(row: Row) -> Estimate:
 
 def _over_interval(found: Estimate) -> str:
     value, low, high = found
-    return "undefined" if math.isnan(value) else f"{number(value)}\n{number(low)}–{number(high)}"
+    if math.isnan(value):
+        return "undefined" if math.isnan(low) else f"≥ {number(low)}"
+    return f"{number(value)}\n{number(low)}–{number(high)}"
 
 
 def bracketed(found: Estimate, *, signed: bool = False) -> str:
-    """A value with its interval in brackets; nothing if it is undefined."""
+    """A value with its interval in brackets, or what it is at least; nothing if it is undefined."""
     if math.isnan(found.value):
-        return ""
+        return "" if math.isnan(found.low) else f"≥ {number(found.low)}"
     plus = "+" if signed and found.value > 0.0 else ""
     return f"{plus}{number(found.value)} [{number(found.low)}, {number(found.high)}]"
 

@@ -7,16 +7,16 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from lean_yaw_env.envs.info import FallCode
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.simulation import Simulation
-from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.validation import require_count
 
 from ..agent import Agent, State, attach
 from ..seeds import MOST_EPISODES, EpisodeSet, first_seed
-from .episodes import RETURN, SPEED, Episodes, Results, Row, summary
+from .episodes import FELL, RETURN, SPEED, TIME, Episodes, Results, Row, metric_names, summary
 
 _CHUNK = 1024  # walkers stepped together
 
@@ -99,7 +99,6 @@ def _run_chunk(
 ) -> Episodes:
     """One episode for each seed, walked side by side; those that have ended walk on unseen."""
     chosen = EnvOptions() if options is None else options
-    task = task_named(task_name)
     n = len(seeds)
     env = WalkerVectorEnv(n, task_name, step_info=False, copy=False, **vars(chosen))
     observations, _ = env.reset(seed=list(seeds))
@@ -107,7 +106,7 @@ def _run_chunk(
     ended = np.zeros(n, dtype=np.bool_)
     survived = np.zeros(n, dtype=np.bool_)
     returns = np.zeros(n)
-    metrics = {name: np.full(n, np.nan) for name in (RETURN, *task.metrics, SPEED)}
+    metrics = {name: np.full(n, np.nan) for name in metric_names(task_name)}
     state: State = None
     starts = np.ones(n, dtype=np.bool_)
     while not ended.all():
@@ -132,9 +131,10 @@ def _run_chunk(
 
 
 def _metrics(simulation: Simulation, ended: NDArray[np.bool_]) -> dict[str, Vector]:
-    """The task's metrics of ended episodes, from their records; NaN where there was nothing to measure."""
+    """All but the return of ended episodes, from their records; NaN where there was nothing to measure."""
     walkers, tasks = simulation.walkers[ended], simulation.tasks[ended]
     found = simulation.task.measure(walkers, tasks, undefined=np.nan)
-    time = walkers["time"]
-    nowhere = np.full(len(time), np.nan)
-    return found | {SPEED: np.divide(walkers["distance"], time, out=nowhere, where=time > 0.0)}
+    time, falls = walkers["time"].copy(), walkers["fall"]
+    speed = np.divide(walkers["distance"], time, out=np.full(len(time), np.nan), where=time > 0.0)
+    fell = (falls != FallCode.NONE) & (falls != FallCode.SOLVER)
+    return found | {SPEED: speed, TIME: time, FELL: fell.astype(float)}

@@ -15,8 +15,6 @@ from lean_yaw_env.validation import require_choice
 
 from ..agent import Agent
 from ..controllers.guidance import regulator_for
-from ..controllers.mpc import MpcController
-from ..controllers.mpc_settings import MpcSettings
 from ..controllers.simple import HeadingFeedback, HeadingGains
 from ..learning.algorithms import settings_for
 from ..registry import agent_entry
@@ -61,14 +59,12 @@ def space_of(agent: str, task: str, horizon: float | None = None) -> Space:
     ValueError
         If there is no such task, or nothing to tune of the agent at it.
     """
-    require_choice("agent", agent, ("feedback", "lqr", "mpc", *_LEARNERS))
+    require_choice("agent", agent, ("feedback", "lqr", *_LEARNERS))
     own = [name for tuned_agent, name in RANGES if tuned_agent == agent]
     others = [each for each in agent_entry(agent).tasks if each in TASK_VERSIONS]
     require_choice("task", task, own or others)
     if agent in _LEARNERS:
         return _learner_space(agent, task)
-    if agent == "mpc":
-        return _mpc_space(task, horizon)
     return _gain_space(agent, task, horizon)
 
 
@@ -186,59 +182,6 @@ def _near(trial: Trial, path: str, start: float, entry: Range) -> float:
     value = min(max(value, low), high)
     # gaits are computed anew for each offset that pumps, so that few of those are tried
     return round(value, 3) if "pumping" in path else float(f"{value:.{DIGITS}g}")
-
-
-# ---- predictive control
-
-STEPS_PER_DECISION = 2400
-"""Walking steps of all plans together, near 2 ms on one core: the same for every trial, so that the search improves the plans and not the time they take."""
-_KNOTS = (0.0, 0.15, 0.35, 0.7)  # shares of the horizon
-_PUMPING_TASKS = (
-    "Metastable",
-    "UTurn",
-    "Level",
-)  # where the masses may change sides from step to step
-
-_PLANS: dict[str, Range] = {
-    "horizon": (1, 24, False),
-    "tail": (0, 24, False),
-    "iterations": (1, 4, False),
-    "scenarios": (0, 16, False),
-    "spread.angle": (0.05, 1.0, True),
-    "spread.steady": (0.05, 1.0, True),
-    "spread.alternating": (0.05, 1.0, True),
-    "window": (4.0, 40.0, True),
-    "step_price": (0.0, 0.1, False),
-    "trust": (0.01, 100.0, True),
-    "margin": (0.0, 3.0, False),
-    "push_scale": (0.5, 3.0, False),
-}
-
-
-def _mpc_space(task: str, horizon: float | None) -> Space:
-    settings = tuned("mpc", task, MpcSettings())
-    left_out = set() if task in _PUMPING_TASKS else {"spread.alternating"}
-    if not settings.scenarios:
-        left_out |= {"scenarios", "push_scale"}
-    ranges = {path: entry for path, entry in _PLANS.items() if path not in left_out}
-    start = _starting(settings, ranges)
-
-    def suggest(trial: Trial) -> MpcSettings:
-        values = _drawn(trial, ranges, start)
-        steps = values["horizon"] + values["tail"]
-        draws = max(values.get("scenarios", settings.scenarios), 1)
-        samples = min(STEPS_PER_DECISION // (values["iterations"] * steps * draws), 200)
-        values |= {
-            "knots": tuple(sorted({int(share * values["horizon"]) for share in _KNOTS})),
-            "samples": samples,
-            "elites": max(2, samples // 6),
-        }
-        return with_values(settings, values)
-
-    def make(options: EnvOptions, chosen: MpcSettings) -> Agent:
-        return MpcController(task, options, chosen)
-
-    return Space(settings, start, suggest, False, 24, make, (EnvOptions(horizon=horizon),))
 
 
 # ---- learners

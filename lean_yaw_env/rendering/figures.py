@@ -9,6 +9,7 @@ from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.files import require_ending, written_whole
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 ENDINGS = (".png", ".svg", ".pdf")
@@ -30,6 +31,20 @@ def new_figure(width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
+
+
+def panels(
+    count: int, columns: int, size: tuple[float, float], margin: tuple[float, float], **shared: bool
+) -> tuple[Figure, list[Axes]]:
+    """A figure with so many panels, up to ``columns`` beside one another: ``size`` inches each, within a margin. ``shared`` may hold ``sharex`` and
+    ``sharey``."""
+    columns = min(count, columns)
+    lines = -(-count // columns)
+    figure = new_figure(size[0] * columns + margin[0], size[1] * lines + margin[1])
+    places = list(figure.subplots(lines, columns, squeeze=False, **shared).flat)
+    for spare in places[count:]:
+        spare.set_axis_off()
+    return figure, places[:count]
 
 
 def save_figure(figure: Figure, path: str | os.PathLike[str], *, dpi: float = _DPI) -> None:
