@@ -6,19 +6,21 @@ import { PALETTE } from "./palette";
 const PATH_STEP = 0.25;
 const PATH_WIDTH = 0.06;
 const ARROW_AWAY = 0.55;
+const POST = 0.7; // height of a gate's posts
 
 export class TaskMarks {
   readonly group = new THREE.Group();
   private readonly goal = new THREE.Group();
   private readonly arrow: THREE.Mesh;
   private path: THREE.Mesh | null = null;
+  private readonly gates = [gate(1), gate(0.45)];
   private goalRadius = 0;
 
   constructor() {
     this.arrow = new THREE.Mesh(arrowShape(), new THREE.MeshStandardMaterial({ color: PALETTE.command, roughness: 0.6 }));
     this.arrow.castShadow = true;
-    this.goal.visible = this.arrow.visible = false;
-    this.group.add(this.goal, this.arrow);
+    this.group.add(this.goal, this.arrow, ...this.gates);
+    this.clear();
   }
 
   setGoal(place: [number, number] | null, radius: number): void {
@@ -26,6 +28,17 @@ export class TaskMarks {
     if (!place) return;
     if (radius !== this.goalRadius) this.buildGoal(radius);
     this.goal.position.set(place[0], 0, place[1]);
+  }
+
+  /** Gates of a race: the next one and the one after it, as wide as walkers must be right. */
+  setGates(places: ([number, number] | null)[], halfWidth: number): void {
+    this.gates.forEach((mark, k) => {
+      const place = places[k];
+      mark.visible = Boolean(place);
+      if (!place) return;
+      mark.position.set(place[0], 0, place[1]);
+      mark.scale.set(1, 1, halfWidth);
+    });
   }
 
   private buildGoal(radius: number): void {
@@ -85,9 +98,31 @@ export class TaskMarks {
 
   clear(): void {
     this.setGoal(null, 0);
+    this.setGates([], 1);
     this.setHeading(null, [0, 0]);
     this.setPath(null);
   }
+}
+
+/** Two posts, 1 to either side, and a stripe between them on the floor. */
+function gate(opacity: number): THREE.Group {
+  const group = new THREE.Group();
+  const material = new THREE.MeshStandardMaterial({ color: PALETTE.goal, roughness: 0.4, emissive: PALETTE.goal, emissiveIntensity: 0.2, transparent: opacity < 1, opacity });
+  for (const side of [-1, 1]) {
+    const post = new THREE.Mesh(new THREE.CylinderGeometry(0.025, 0.025, POST, 20).translate(0, 0.5 * POST, side), material);
+    post.castShadow = opacity === 1;
+    group.add(post);
+  }
+  const stripe = new THREE.Mesh(
+    new THREE.PlaneGeometry(0.05, 2).rotateX(-0.5 * Math.PI).translate(0, 0.004, 0),
+    new THREE.MeshBasicMaterial({ color: PALETTE.goal, transparent: true, opacity: 0.6 * opacity, depthWrite: false }),
+  );
+  const flag = new THREE.Mesh(
+    new THREE.PlaneGeometry(2, 0.12).rotateY(0.5 * Math.PI).translate(0, POST - 0.06, 0),
+    new THREE.MeshBasicMaterial({ color: PALETTE.goal, transparent: true, opacity: 0.55 * opacity, depthWrite: false, side: THREE.DoubleSide }),
+  );
+  group.add(stripe, flag);
+  return group;
 }
 
 /** A flat arrow along x. */
