@@ -188,7 +188,7 @@ export class Episode {
   }
 
   get commandedHeading(): number | null {
-    return this.task.heading && this.value(this.task.heading);
+    return this.task.heading === null ? null : this.value(this.task.heading);
   }
 
   /** How far to the right the path to be followed is at a place downhill; null if there is no path. */
