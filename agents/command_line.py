@@ -154,9 +154,9 @@ def retrain(
 
 @_command("tune")
 def tune(
-    agent: Annotated[str, Argument(help="feedback, lqr, ppo or sac.")],
+    agent: Annotated[str, Argument(help="feedback, lqr, linear, ppo or sac.")],
     task: Annotated[str, Argument(help="The task's name.")],
-    trials: Annotated[int, Option(help="Total number of trials, including those in the study already.")] = 100,
+    trials: Annotated[int, Option(help="Total number of trials, including those in the study already; of linear, generations of 16 laws.")] = 100,
     episodes: Annotated[int | None, Option(help="Episodes that settings are scored on; 128 for feedback and lqr, 512 for learners "
         "otherwise.")] = None,
     horizon: Annotated[float | None, Option(help="Length of these episodes, of controllers; the task's otherwise.")] = None,
@@ -173,6 +173,15 @@ def tune(
     from .tuning.study import Tuning, best_trial, result_words
     from .tuning.study import tune as run_trials
 
+    if agent == "linear":
+        from .tuning.linear import tune_linear
+
+        file = out or Path("runs", "tuning", f"{agent}-{task}.best.json")
+        score = tune_linear(task, trials, file, shown=typer.echo)
+        typer.echo(
+            f"best: {score:.2f}, written to {file}; keep it by: python -m {__package__} ship {file} --replace"
+        )
+        return
     place = Path("runs", "tuning", f"{agent}-{task}.db") if storage is None else storage
     best_file = place.with_suffix(".best.json") if out is None else out
     tuning = Tuning.of(
@@ -310,7 +319,7 @@ def command_as_typed() -> str:
 @_command("reference")
 def reference(
     task: Tasks = None,
-    episodes: Annotated[int, Option(help="Validation episodes that are searched.")] = 32,
+    episodes: Annotated[int, Option(min=1, help="Validation episodes that are searched.")] = 16,
     again: Annotated[bool, Option("--again", help="Search also for tasks that the file has a reference of.")] = False,
     processes: Annotated[int, Option(min=1, help="Processes, each at a task of its own.")] = 1,
     out: Annotated[Path | None, Option(help="JSON file of references; the package's own otherwise.")] = None,
@@ -342,8 +351,8 @@ def reference(
 def robustness(
     task: Tasks = None,
     agents: Annotated[str, Option(help="Agents, separated by commas, or all.")] = ALL,
-    episodes: Annotated[int, Option(help="Episodes of each agent under each variation, for each of its trainings.")] = 200,
-    costly_episodes: Annotated[int, Option(help="Largest number of episodes for agents that plan at every step (mpc).")] = 20,
+    episodes: Annotated[int, Option(help="Episodes of each agent under each variation, for each of its trainings.")] = 100,
+    costly_episodes: Annotated[int, Option(help="Largest number of episodes for agents that plan at every step (mpc).")] = 5,
     seed: Annotated[int, Option(help="Seed of the validation episodes.")] = 0,
     agent_path: AgentPath = None,
     runs: Runs = Path("runs"),
@@ -367,7 +376,26 @@ def robustness(
     names = names_in([agents])
     candidates = evaluation.candidates(tasks_in(task or ["Heading"]), [] if ALL in names else names)
     rows = robustness_rows(candidates, evaluation)
-    typer.echo(f"written: {write_robustness(rows, out, command_as_typed())}")
+    typer.echo(f"written: {write_robustness(rows, out, command_as_typed(), evaluation)}")
+
+
+@_command("dataset")
+def dataset(
+    task: Tasks = None,
+    kind: Annotated[str, Option(help="expert, medium (the expert with noise on its actions), random or mixed; several separated by commas, or all.")] = ALL,
+    expert: Annotated[str, Option(help="The agent that the expert is.")] = "ppo",
+    episodes: Annotated[int, Option(help="Episodes of each dataset.")] = 300,
+    seed: Annotated[int, Option(help="Seed of a training: the episodes are of its environment seeds.")] = 0,
+    out: Annotated[Path, Option(help="Folder of Minari's datasets.")] = Path("datasets"),
+) -> None:  # fmt: skip
+    """Write datasets for offline reinforcement learning in Minari's format: leanyaw/TASK/KIND-v1."""
+    from .datasets import KINDS, make_dataset
+
+    kinds = names_in([kind])
+    for each in tasks_in(task or ["Heading"]):
+        for one in KINDS if ALL in kinds else kinds:
+            name = make_dataset(each, one, out, expert=expert, episodes=episodes, seed=seed)  # pyright: ignore[reportArgumentType]
+            typer.echo(f"written: {name} in {out}")
 
 
 @_command("closed-loop")
@@ -440,7 +468,7 @@ def capture(
 def film(
     task: Annotated[str, Option(help="A task's name, or all.")] = ALL,
     agent: Annotated[str, Option(help="The agent. If it was not trained for a task, lqr is filmed instead.")] = "ppo",
-    out: Annotated[Path, Option(help="Folder for <task>.gif.")] = Path("docs/videos"),
+    out: Annotated[Path, Option(help="Folder for <task>.gif.")] = Path("films"),
     seed: Annotated[int, Option(help="Another number films other episodes.")] = 0,
     seconds: Annotated[float, Option(help="Of each film.")] = 11.0,
     speed: Annotated[float, Option(help="Times real time for legs of a metre.")] = 2.0,

@@ -22,6 +22,7 @@ from lean_yaw_env.validation import (
 
 from .agent import Agent
 from .controllers.guidance import guided
+from .controllers.linear import LinearLaw
 from .controllers.mpc import MpcController
 from .controllers.simple import FixedController, HeadingFeedback, RandomController
 from .observations import ObservationLayout
@@ -33,6 +34,7 @@ from .policies.policy_files import (
     shipped_seeds,
     task_of,
 )
+from .settings import all_settings
 
 Kind = Literal["baseline", "feedback", "planner", "learned"]
 """How an agent chooses: blindly, by feedback from its observation, by a search on the walker itself at every step, or as it was trained."""
@@ -94,6 +96,10 @@ def _lqr(request: AgentRequest) -> Agent:
     return guided("Waypoint" if task == GOAL_TASK else task, request.options)
 
 
+def _linear(request: AgentRequest) -> Agent:
+    return LinearLaw(task_of(request.env_id), request.options)
+
+
 def _mpc(request: AgentRequest) -> Agent:
     task, base = task_of(request.env_id), make_base(request)[1]
     return MpcController(task, request.options, base, seed=request.seed)
@@ -127,11 +133,18 @@ def _trained(algorithm: str) -> Callable[[AgentRequest], Agent]:
 _STEERED = ("Heading", "SpeedHeading", "UTurn", "Level", "Energy", "UnknownBody", "Hills")
 """Tasks that command a heading."""
 
+_REGULATED = tuple(task for task in ALL_TASKS if task not in ("LevelUphill", "Energy"))
+"""Tasks that the regulator is for. Without a slope it needs settings of pumping, which are found for Level alone."""
+
+LINEAR_TASKS = tuple(all_settings().get("linear", {}))
+"""Tasks for which a linear law was found."""
+
 AGENTS: dict[str, AgentEntry] = {
     "random": AgentEntry("baseline", lambda asked: RandomController(asked.seed, _layout(asked))),
     "fixed": AgentEntry("baseline", lambda asked: FixedController(_layout(asked))),
     "feedback": AgentEntry("feedback", _feedback, _STEERED),
-    "lqr": AgentEntry("feedback", _lqr),
+    "lqr": AgentEntry("feedback", _lqr, _REGULATED),
+    "linear": AgentEntry("feedback", _linear, LINEAR_TASKS),
     "mpc": AgentEntry("planner", _mpc, tuple(TASK_VERSIONS)),
     "ppo": AgentEntry("learned", _trained("ppo")),
     "sac": AgentEntry("learned", _trained("sac")),

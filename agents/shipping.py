@@ -27,7 +27,7 @@ from .policies import policy_files
 from .policies.policy_files import load, save, shipping_folder
 from .registry import agent_entry
 from .settings import all_settings, keep_settings, with_values
-from .tuning.spaces import space_of
+from .tuning.spaces import settings_of
 
 
 def ship(source: Path, *, replace: bool = False) -> list[Path]:
@@ -151,7 +151,7 @@ def _ship_settings(file: Path, replace: bool) -> Path:
     record = read_json(file)
     try:
         agent, task, values = (record[key] for key in ("agent", "task", "values"))
-        with_values(type(space_of(agent, task).settings)(), values)
+        with_values(type(settings_of(agent, task))(), values)
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"{str(file)!r} is not what a tuning leaves: {error}") from error
     there = all_settings().get(agent, {}).get(task, {})

@@ -21,3 +21,7 @@ class SolverError(LeanYawError):
     Known only of springs or dampers that move an ankle next to without inertia (hip width below 0.05, small ankle tilt) more than a thousand
     times faster than it walks: soften them.
     """
+
+
+class ClusterError(LeanYawError):
+    """A scheduler or a worker could not do its part; the message names it. What was done before is kept, where the work has a store."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -83,7 +84,7 @@ def test_settling_is_undefined_where_no_command_was_settled_rather_than_zero():
 
 
 def test_survival_stands_beside_every_metric():
-    wild = EnvOptions(horizon=40.0, max_offset_change=0.1)
+    wild = EnvOptions(horizon=40.0, max_offset_change=0.1, friction_limit=math.inf)
     results = run_episodes(RandomController(0), "Heading", episodes=16, options=wild)
     assert 0.0 < results.survived.mean() < 1.0
     rows = summary(Results("Heading", "random", (results,)))

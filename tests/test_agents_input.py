@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from agents import AGENTS, AgentRequest, FixedController, RandomController, make_agent
+from agents import AgentRequest, FixedController, RandomController, make_agent
 from agents.agent import attach
-from agents.registry import env_id_of
+from agents.registry import env_id_of, names_for
 from lean_yaw_env.envs import WalkerVectorEnv
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.registration import GOAL_TASK
@@ -37,7 +37,9 @@ def made(name: str) -> Any:
     return agent
 
 
-@pytest.mark.parametrize("name", [name for name in AGENTS if name not in ("her", "sac")])
+@pytest.mark.parametrize(
+    "name", names_for(AgentRequest(env_id_of("Heading"), EnvOptions(), runs=None))
+)
 def test_every_agent_refuses_observations_that_are_no_finite_numbers_of_its_shape(
     name: str,
 ) -> None:

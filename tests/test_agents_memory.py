@@ -12,12 +12,13 @@ from agents.learning import stable_baselines
 from agents.learning.algorithms import ALGORITHMS, train
 from agents.learning.ppo import FramesSettings
 from agents.learning.recurrent import RecurrentSettings
-from agents.learning.runs import Training
+from agents.learning.runs import Training, make_run, run
 from agents.learning.tqc import TQCSettings
 from agents.observations import ObservationLayout
 from agents.policies.policy import Policy, PolicyCard
 from agents.registry import AGENTS, agent_entry
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.files import read_json
 
 ID = "LeanYaw/UnknownBody-v1"
 ON_POLICY = {"steps": 768, "walkers": 8, "steps_per_update": 32, "batch_size": 128, "epochs": 1}
@@ -104,6 +105,17 @@ def test_frames_are_the_latest_observations_of_the_episode():
     for k in (3, 4):
         again, state = policy.predict(seen[k], state, np.array(False))
     assert np.array_equal(actions, again)
+
+
+@pytest.mark.parametrize("algorithm", ["frames", "recurrent"])
+def test_a_run_of_a_policy_that_remembers_is_evaluated(tmp_path, algorithm):
+    options = EnvOptions(horizon=15.0)
+    training = Training(ID, 0, TINY[algorithm], options, episodes=4, algorithm=algorithm, is_compared=False)  # fmt: skip
+    make_run(training, tmp_path / "run")
+    rows = run(tmp_path / "run", progress=False).rows
+    assert {row.agent for row in rows} == {algorithm}
+    statistics = read_json(tmp_path / "run" / "observation_statistics.json")
+    assert tuple(statistics) == ObservationLayout.of("UnknownBody", options).names
 
 
 def test_the_oracle_sees_the_body_and_every_algorithm_has_an_agent():

@@ -16,6 +16,7 @@ from agents.evaluation.episodes import direction
 from agents.evaluation.reference_search import find_reference, write_reference
 from agents.references import normalised, read_references, references
 from agents.seeds import first_seed
+from agents.settings import with_values
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.registration import TASK_VERSIONS
 
@@ -38,8 +39,7 @@ def test_references_that_come_with_the_package_are_of_its_tasks():
         assert sign * found.fixed < sign * found.base_value <= sign * found.value
         assert found.first_seed >= first_seed("validation")
         for settings in found.searches:
-            values = {name: tuple(v) if isinstance(v, list) else v for name, v in settings.items()}
-            assert MpcSettings(**values).scenarios == 0
+            assert with_values(MpcSettings(), settings).scenarios == 0
 
 
 def test_normalised_scores_are_0_for_the_fixed_controller_and_1_for_the_reference(

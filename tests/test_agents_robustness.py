@@ -13,7 +13,13 @@ from agents import AgentRequest, make_agent
 from agents.command_line import app
 from agents.evaluation.episodes import RETURN
 from agents.evaluation.plan import Candidate, Evaluation
-from agents.evaluation.robustness import NOMINAL, VARIATIONS, robustness_rows, varied
+from agents.evaluation.robustness import (
+    NOMINAL,
+    VARIATIONS,
+    collapses,
+    robustness_rows,
+    varied,
+)
 from agents.evaluation.scoring import run_episodes
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
@@ -59,6 +65,21 @@ def test_the_command_writes_page_numbers_and_picture(tmp_path: Path):
     rows = list(csv.DictReader((tmp_path / "robustness.csv").open()))
     assert len(rows) == 2 * len(VARIATIONS)
     assert [row["options"] for row in rows[:2]] == ["{}", '{"sensor_noise": 0.1}']
+    assert all(line[0] == "Walk" for line in collapses(tmp_path / "robustness.csv"))
     page = (tmp_path / "robustness.md").read_text()
     assert "| agent | as it is | noise 0.1 |" in page
     assert (tmp_path / "images" / "robustness.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_collapse_is_half_of_the_mean_or_nine_tenths_of_the_time_to_a_fall(tmp_path: Path):
+    lines = [
+        "task,agent,variation,mean,low",
+        f"Heading,ppo,{NOMINAL},180,179", "Heading,ppo,delay,91,90", "Heading,ppo,noise 0.3,70,69", "Heading,ppo,steeper,80,79",
+        f"Heading,lqr,{NOMINAL},180,179", "Heading,lqr,delay,170,169",
+        f"Metastable,ppo,{NOMINAL},,5.5", "Metastable,ppo,delay,4.6,4.5", "Metastable,ppo,more pushes,2.1,2.0",
+    ]  # fmt: skip
+    (tmp_path / "robustness.csv").write_text("\n".join(lines))
+    assert collapses(tmp_path / "robustness.csv") == [
+        ["Heading", "ppo", "180.0", "noise 0.3 (70.0), steeper (80.0)"],
+        ["Metastable", "ppo", "5.500", "more pushes (2.100)"],
+    ]

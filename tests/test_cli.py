@@ -17,11 +17,11 @@ from lean_yaw_env import Walker, WalkerParameters, find_limit_cycle
 from lean_yaw_env.analysis import basin, stability_map
 from lean_yaw_env.cli.app import app
 from lean_yaw_env.cli.commands import parse_axes, parse_range
-from lean_yaw_env.cli.plots import basin_figure, gait_figure, map_figure
 from lean_yaw_env.cli.records import as_json, text_of
+from lean_yaw_env.plots import basin_figure, gait_figure, map_figure
 from lean_yaw_env.vehicles import BENCHMARK_2007, benchmark_bicycle
 
-COMMANDS = ("gait", "map", "basin", "bicycle", "skateboard", "reproduce", "play", "view")
+COMMANDS = ("gait", "map", "basin", "atlas", "bicycle", "skateboard", "reproduce", "play", "view")
 runner = CliRunner()
 
 
@@ -378,7 +378,7 @@ def test_a_large_map_says_what_it_costs_and_one_beyond_memory_is_refused(
     monkeypatch.setattr("lean_yaw_env.cli.app._MANY_POINTS", 3)
     result = runner.invoke(app, ["map", "slope=0.005:0.05:4"])
     assert result.exit_code == 0
-    assert "4 points: about" in result.output and "GB of memory and" in result.output
+    assert "4 points: about" in result.output and "minutes of one core" in result.output
     result = runner.invoke(app, ["map", "slope=0.005:0.05:4", "--threads", "0"])
     assert result.exit_code == 2
     assert "threads must be from 1 to 1024, got 0" in result.output

@@ -652,7 +652,7 @@ def test_keys_cover_what_can_be_held_and_steer_to_their_side() -> None:
     "name", ["TimeAwareObservation", "NumpyToTorch", "RecordEpisodeStatistics"]
 )
 def test_gymnasium_s_wrappers_take_it(name: str) -> None:
-    env = getattr(gym.wrappers, name)(gym.make("LeanYaw/Metastable-v1", max_episode_steps=5))
+    env = getattr(gym.wrappers, name)(gym.make("LeanYaw/Heading-v1", max_episode_steps=5))
     env.reset(seed=1)
     zero = env.unwrapped.action_space.sample() * 0
     if name == "NumpyToTorch":

@@ -185,17 +185,19 @@ def test_what_an_agent_saves_is_what_the_page_says(task: str, name: str, limit: 
             assert float(expected[key]) == pytest.approx(float(row[key]), abs=0.005)
 
 
-def test_training_against_pushes_doubles_the_basin_and_training_without_shrinks_it() -> None:
+def test_training_against_pushes_doubles_the_basin_and_feedback_saves_more_than_training_for_headings() -> (
+    None
+):
     def of_all(task: str, name: str) -> float:
         return float(agent_rows(task, name, "inf")[0]["saved_of_all"])
 
     for name in ("ppo", "sac"):
         assert of_all("Metastable", name) > 2.0 * of_all("Metastable", "fixed")
-    assert of_all("Heading", "ppo") < of_all("Heading", "fixed") < of_all("Heading", "feedback")
+    assert of_all("Heading", "fixed") < of_all("Heading", "ppo") < of_all("Heading", "feedback")
 
 
-def test_on_a_floor_of_less_friction_the_policy_of_push_slips() -> None:
-    agent = make_agent("ppo", AgentRequest(env_id_of("Metastable"), EnvOptions()))
+def test_on_a_floor_with_a_friction_limit_a_policy_trained_without_one_slips() -> None:
+    agent = make_agent("sac", AgentRequest(env_id_of("Metastable"), EnvOptions()))
     free, slippery = (closed_loop(agent, "Metastable", EnvOptions(friction_limit=limit)) for limit in (np.inf, FRICTION))  # fmt: skip
     starts = box_starts(free, 300)
     before, after = walk_many(free, starts, 62), walk_many(slippery, starts, 62)

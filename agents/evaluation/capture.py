@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from lean_yaw_env.analysis import Choices, capture
-from lean_yaw_env.analysis.attraction import section_grid
+from lean_yaw_env.analysis.attraction import require_plane, states_in
 from lean_yaw_env.analysis.many_walks import walk_many
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
@@ -110,7 +110,8 @@ def examine_capture(
     require_count("starts", starts, 1, 1_000_000)
     require_count("points", points, 2, 2000)
     loop = closed_loop(agent, task, EnvOptions(friction_limit=friction_limit))
-    axes, plane = section_grid(loop, axes_around_start(loop, PLANE, points), loop.start)
+    axes = require_plane(loop, axes_around_start(loop, PLANE, points))
+    plane = states_in(loop, axes, (slice(None), slice(None)), loop.start)
     everything = np.concatenate([box_starts(loop, starts), plane])
     walks = walk_many(loop, everything, MOST_STEPS + SETTLE_STEPS).require_solved()
     bare = np.ascontiguousarray(everything[:, :STATE_SIZE])

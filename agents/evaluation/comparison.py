@@ -111,12 +111,15 @@ class Claim:
 def claims_of(
     results: Mapping[str, ResultsByAgent], rivals: Rivals, threads: int = 1
 ) -> list[Claim]:
-    """Every claim: the fixed controller against random actions, and every other agent against its task's rival, as the better one.
+    """Every claim: the fixed controller against random actions, and every other agent against its task's rival, as the better one; none of tasks that
+    rank nobody.
 
     numpy's loops let threads share the comparisons.
     """
     pairs: list[tuple[str, str, str]] = []
     for task, of_task in results.items():
+        if not task_named(task).is_ranked:
+            continue
         rival = rivals.get(task)
         if "random" in of_task and "fixed" in of_task:
             pairs.append((task, "fixed", "random"))

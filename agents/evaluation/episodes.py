@@ -135,6 +135,7 @@ class Row:
     against : the feedback controller that it is compared with, on the episodes that both have walked
     difference, difference_low, difference_high : the mean less that agent's, with its 95 % interval; NaN where there is no comparison
     p_value : of the difference being zero, of the task's headline only; corrected for the number of claims (Holm)
+    normalised : on the leaderboard, the headline's mean (or what it is at least) where 0 is the fixed controller's and 1 the reference's
     verdict : "better", "worse", "tie" or "mixed", by that p-value: see ``comparison.Claim``
     """
 
@@ -157,6 +158,7 @@ class Row:
     difference_low: float = math.nan
     difference_high: float = math.nan
     p_value: float = math.nan
+    normalised: float = math.nan
     verdict: str | None = None
 
     @property

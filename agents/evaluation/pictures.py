@@ -116,19 +116,14 @@ def save_push_levels_plot(levels: Mapping[float, Sequence[Row]], path: Path) -> 
 
 
 def save_agents_footprints(
-    agents: Mapping[str, Agent],
-    task: str,
-    path: Path,
-    *,
-    seed: int,
-    options: EnvOptions | None = None,
+    agents: Mapping[str, tuple[Agent, EnvOptions]], task: str, path: Path, *, seed: int
 ) -> None:
-    """Draw the first steps of one episode, of an environment's seed, for each agent, all to one scale.
+    """Draw the first steps of one episode, of an environment's seed, for each agent in its environment, all to one scale.
 
     Arrows show commanded headings where they were given, circles goals (full: reached), a broad line the path to be followed.
     """
     episodes: dict[str, RecordedEpisode] = {}
-    for name, agent in agents.items():
+    for name, (agent, options) in agents.items():
         episode = record_episode(agent, task, seed=seed, options=options, most_steps=PICTURED_STEPS)
         ending = " (ended early)" if episode.terminated else ""
         episodes[name + (" (fell)" if episode.fall else ending)] = episode

@@ -130,7 +130,8 @@ class Evaluation:
         """Agents of the registry for tasks; all that there are for a task, in the registry's order, if none is named.
 
         Of several tasks, an agent that is not for one is left out there; of one task that is an error. ``path`` may be a policy's folder, which
-        then stands for its algorithm's agent, or an entry's, which is added.
+        then stands for its algorithm's agent, or an entry's, which is added. Agents that plan walk until a fall only if they are named: an episode
+        takes them minutes.
 
         Raises
         ------
@@ -148,6 +149,8 @@ class Evaluation:
             request = AgentRequest(env_id, self.options, seed=self.seed, runs=self.runs)
             of_folder = replace(request, path=path)
             there = names_for(of_folder if names else request)
+            if task_named(task).headline == TIME_PER_FALL:
+                there = tuple(name for name in there if name in names or not _plans(name))
             if own is not None and own.env_id == env_id:
                 there = tuple(dict.fromkeys((*there, own.algorithm)))
             chosen = [name for name in dict.fromkeys(names) if len(tasks) == 1 or name in there]
@@ -157,29 +160,23 @@ class Evaluation:
                     self._of_registry(name, task, of_folder if names or is_own else request)
                 )
             if entry is not None and task in entry.tasks:
-                found.append(
-                    self._candidate(entry.name, task, entry.trainings, self.options, entry.folder)
-                )
+                found.append(self._candidate(entry.name, task, entry.trainings, entry.folder))
         return found
 
     def _of_registry(self, name: str, task: str, request: AgentRequest) -> Candidate:
         entry = agent_entry(name)
         folders = policy_folders(name, request) if entry.kind == "learned" else []
-        options = entry.needed_options(self.options)
-        return self._candidate(name, task, tuple(folders) or (None,), options)
+        found = self._candidate(name, task, tuple(folders) or (None,))
+        return replace(found, options=entry.needed_options(found.options))
 
     def _candidate(
-        self,
-        name: str,
-        task: str,
-        folders: tuple[Path | None, ...],
-        options: EnvOptions,
-        entry: Path | None = None,
+        self, name: str, task: str, folders: tuple[Path | None, ...], entry: Path | None = None
     ) -> Candidate:
         most = [self.episodes, self.costly_episodes if _plans(name) else MOST_EPISODES]
         if task_named(task).headline == TIME_PER_FALL:
             most.append(LONG_COSTLY_EPISODES if _plans(name) else LONG_EPISODES)
-        return Candidate(task, name, min(most), evaluated_options(task, options), folders, entry)
+        options = evaluated_options(task, self.options)
+        return Candidate(task, name, min(most), options, folders, entry)
 
     def run(self, candidates: Sequence[Candidate]) -> list[Results]:
         """Let every candidate run the episodes of the seed; the same ones at the same task.

@@ -5,6 +5,7 @@ No agent can do that, so that a reference is a score to come near to rather than
 
 from __future__ import annotations
 
+import contextlib
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.files import write_json
 from lean_yaw_env.parameters import Vector
 
@@ -23,21 +25,20 @@ from ..policies.policy_files import load
 from ..references import Reference, read_references
 from ..registry import AgentRequest, agent_entry, env_id_of, make_agent, names_for, policy_folders
 from ..seeds import first_seed
-from .episodes import direction
+from .episodes import FELL, TIME, TIME_PER_FALL, direction
 from .scoring import run_seeds
 
 SEARCHES = (
-    MpcSettings(steps=6, samples=48, iterations=4, trust=0.0, scenarios=0),
-    MpcSettings(steps=12, window=30.0, samples=48, iterations=4, trust=0.0, scenarios=0),
+    MpcSettings(steps=6, samples=32, iterations=3, trust=0.0, scenarios=0),
+    MpcSettings(steps=12, window=30.0, samples=32, iterations=3, trust=0.0, scenarios=0),
 )
 """Short plans and long ones: which are better depends on the task and on the episode."""
-EPISODES, MEAN_EPISODES = 32, 1024
+EPISODES, MEAN_EPISODES = 16, 512
 """Episodes of the search, and of agents that take no time."""
 SEED = 1
 """Of the validation episodes."""
-HORIZONS = {"Metastable": 1000.0}
+HORIZONS = {"Metastable": 400.0}
 """Of tasks whose episodes are too long to plan all of their steps."""
-_TIME_PER_FALL = "time_per_fall"
 
 
 def find_reference(task: str, episodes: int = EPISODES, command: str = "") -> Reference:
@@ -56,7 +57,7 @@ def find_reference(task: str, episodes: int = EPISODES, command: str = "") -> Re
     # what is going to come is known: each episode's best search counts
     best = search.best([base[:episodes], *planned])
     value, error = search.mean(best), search.error(best)
-    if search.metric != _TIME_PER_FALL:
+    if search.metric != TIME_PER_FALL:
         # the mean over many episodes, and over few the gain
         gain = best - base[:episodes]
         value = search.mean(base) + search.mean(gain)
@@ -92,39 +93,45 @@ class _Search:
         """The headline of each episode; of a time per fall, times and falls, shape (count, 2)."""
         seeds = range(self.first, self.first + count)
         found = run_seeds(agent, self.task, seeds, options=self.options).metrics
-        if self.metric == _TIME_PER_FALL:
-            return np.column_stack([found["time"], found["fell"]])
+        if self.metric == TIME_PER_FALL:
+            return np.column_stack([found[TIME], found[FELL]])
         return found[self.metric]
 
     def mean(self, values: Vector) -> float:
         """The headline over all episodes; a time per fall counts one fall at least."""
-        if self.metric == _TIME_PER_FALL:
+        if self.metric == TIME_PER_FALL:
             times, falls = values.sum(axis=0)
             return float(np.log10(times / max(falls, 1.0)))
         return float(values.mean())
 
     def error(self, values: Vector) -> float:
         """The standard error of that."""
-        if self.metric == _TIME_PER_FALL:
+        if self.metric == TIME_PER_FALL:
             return float(1.0 / (np.log(10.0) * np.sqrt(max(values[:, 1].sum(), 1.0))))
         return float(values.std() / np.sqrt(len(values)))
 
     def best(self, found: list[Vector]) -> Vector:
         """Each episode's best values."""
         table = np.stack(found)
-        worth = table[..., 0] if self.metric == _TIME_PER_FALL else self.sign * table
+        worth = table[..., 0] if self.metric == TIME_PER_FALL else self.sign * table
         return table[worth.argmax(axis=0), np.arange(table.shape[1])]
 
 
 def _bases(task: str, options: EnvOptions) -> dict[str, Agent]:
-    """Agents that plans may deviate from: the package's feedback controllers and trained policies, of every training."""
+    """Agents that plans may deviate from, by name: the package's feedback controllers and trained policies, but for those that remember or see more."""
     request = AgentRequest(env_id_of(task), options, runs=None)
+    observation = np.zeros((1, len(options.observation_names(task_named(task)))), np.float32)
     found: dict[str, Agent] = {}
     for name in names_for(request, ("feedback", "learned")):
-        if agent_entry(name).kind == "feedback":
-            found[name] = make_agent(name, request)
-        for folder in policy_folders(name, request) if agent_entry(name).kind == "learned" else ():
-            found[f"{name} {folder.name}"] = load(folder)
+        entry = agent_entry(name)
+        if entry.kind == "feedback":
+            with contextlib.suppress(NoGaitError):
+                found[name] = make_agent(name, request)
+            continue
+        for folder in () if entry.options else policy_folders(name, request):
+            policy = load(folder)
+            if policy.predict(observation)[1] is None:
+                found[f"{name} {folder.name}"] = policy
     return found
 
 

@@ -8,6 +8,7 @@ import json
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, fields
+from typing import TypeVar
 
 from rich import box
 from rich.console import Console
@@ -18,6 +19,7 @@ from lean_yaw_env.envs.tasks import task_named
 from .episodes import SURVIVAL, Row, words
 from .intervals import Estimate
 
+Value = TypeVar("Value")
 IMAGES = "images"
 """Folder of a page's pictures, beside it."""
 _WIDTH = 5  # agents in a table: so many fit a terminal of 80 columns
@@ -25,13 +27,12 @@ _WIDTH = 5  # agents in a table: so many fit a terminal of 80 columns
 
 def rows_to_plain(rows: Sequence[Row]) -> list[dict[str, str | int | float | None]]:
     """Rows as plain values; what is undefined is null."""
-    return [
-        {
-            key: None if isinstance(value, float) and math.isnan(value) else value
-            for key, value in asdict(row).items()
-        }
-        for row in rows
-    ]
+    return [{key: plain_number(value) for key, value in asdict(row).items()} for row in rows]
+
+
+def plain_number(value: Value) -> Value | None:
+    """The value; None for NaN."""
+    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def rows_to_json(rows: Sequence[Row]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +50,7 @@ def run_episodes(
 def run_seeds(
     agent: Agent,
     task: str,
-    seeds: range,
+    seeds: Sequence[int],
     *,
     options: EnvOptions | None = None,
     progress: Progress | None = None,
@@ -93,7 +93,7 @@ def evaluate(
 def _run_chunk(
     agent: Agent,
     task_name: str,
-    seeds: range,
+    seeds: Sequence[int],
     options: EnvOptions | None,
     progress: Progress | None,
 ) -> Episodes:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from lean_yaw_env.envs.options import EnvOptions
+from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.rendering.filming import FilmFile, Frame
 from lean_yaw_env.rendering.motion import SECONDS_PER_TIME_UNIT
 from lean_yaw_env.rendering.palette import ANKLE_AXIS, FAINT_INK, FLOOR, INK
@@ -119,7 +121,8 @@ def agent_for(name: str, task: str, runs: Path, path: Path | None = None) -> tup
     found = names_for(request)
     for candidate in (name, *STAND_INS):
         if candidate in found:
-            return candidate, make_agent(candidate, request)
+            with suppress(NoGaitError):  # lqr on a slope whose gait is none without an agent
+                return candidate, make_agent(candidate, request)
     raise ValueError(f"agent must be one for {task}: {', '.join(found)}; got {name!r}")
 
 

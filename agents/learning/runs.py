@@ -233,16 +233,18 @@ def _run(folder: Path, training: Training, progress: bool, report: Report | None
         )  # fmt: skip
     title = f"{training.algorithm.upper()} on {task}, seed {training.seed}: {steps:,} steps in {log.seconds:.0f} s"
     save_learning_curve(log, rows, training.algorithm, title, steps, folder / CURVE_FILE)
-    save_agents_footprints(
-        agents, task, folder / FOOTPRINTS_FILE, seed=first_seed("validation"), options=training.options
-    )  # fmt: skip
+    walked = {name: (agent, training.options) for name, agent in agents.items()}
+    save_agents_footprints(walked, task, folder / FOOTPRINTS_FILE, seed=first_seed("validation"))
     write_json(folder / EVALUATION_FILE, rows_to_plain(rows))  # last: it marks the run as finished
     return FinishedRun(policy, rows)
 
 
 def _write_statistics(folder: Path, policy: Policy) -> None:
     """The statistics that normalise observations, for people; the policy's own file has them too."""
-    mean, variance = policy.weights["observation_mean"], policy.weights["observation_variance"]
+    size = len(policy.card.layout.names)  # of the latest frame, where a policy sees several
+    mean, variance = (
+        policy.weights[f"observation_{name}"][-size:] for name in ("mean", "variance")
+    )
     record = {
         name: {"mean": float(m), "variance": float(v)}
         for name, m, v in zip(policy.card.layout.names, mean, variance, strict=True)

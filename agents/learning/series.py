@@ -280,6 +280,7 @@ def run_side_by_side(
                     failed.append(f"the training in {str(folder)!r} failed: {words}")
                 else:
                     yield folder
+        pool.shutdown()  # a process that is terminated while it ends prints a traceback
         if failed:
             raise RunError("; ".join(failed))
     finally:

@@ -15,6 +15,7 @@ from lean_yaw_env.validation import require_choice
 
 from ..agent import Agent
 from ..controllers.guidance import regulator_for
+from ..controllers.linear import LinearSettings
 from ..controllers.simple import HeadingFeedback, HeadingGains
 from ..learning.algorithms import settings_for
 from ..registry import agent_entry
@@ -68,6 +69,12 @@ def space_of(agent: str, task: str, horizon: float | None = None) -> Space:
     return _gain_space(agent, task, horizon)
 
 
+def settings_of(agent: str, task: str) -> Any:
+    """The present settings of an agent that is tuned."""
+    is_linear = agent == "linear"
+    return tuned(agent, task, LinearSettings()) if is_linear else space_of(agent, task).settings
+
+
 def _drawn(trial: Trial, entries: Mapping[str, Entry], start: Mapping[str, Any]) -> Values:
     """A trial's values; the present value is one more choice if it is none of the choices."""
     values: Values = {}
@@ -114,6 +121,7 @@ _LIMIT: dict[str, Range] = {"largest_error": (0.1, 3.0, True)}
 _ANGLE: dict[str, Range] = {"inter_leg_angle": (0.15, 0.45, False)}
 _TURN = _LIMIT | {"turning_angle": (0.2, 0.45, False), "turning_error": (0.05, 1.0, True)}
 _GUIDED = {f"loop.{path}": entry for path, entry in (_LOOP | _ANGLE | _TURN).items()}
+_TO_GOALS = _GUIDED | {"radius": (1.0, 8.0, True), "persistence": (0.0, 2.0, False)}
 _PUMPING: dict[str, Range] = {"pumping.downhill": (0.0, 0.045, False)}
 _UPHILL: dict[str, Range] = {"pumping.uphill": (0.01, 0.05, False)}
 _STEERING: dict[str, Range] = {
@@ -131,14 +139,20 @@ RANGES: dict[tuple[str, str], dict[str, Range]] = {
     ("feedback", "SpeedHeading"): _STEERING | _SPEED,
     ("feedback", "UTurn"): _STEERING | _PUMPING | _UPHILL,
     ("feedback", "Level"): _STEERING | _PUMPING,
+    ("feedback", "Energy"): _STEERING | _SPEED | _PUMPING | {"pumping_by_speed": (0.0, 0.1, False)},
+    ("feedback", "UnknownBody"): _STEERING,
+    ("feedback", "Hills"): _STEERING | _SPEED,
     ("lqr", "Heading"): _LOOP | _ANGLE | _TURN,
     ("lqr", "SpeedHeading"): _LOOP | _LIMIT | _SPEED_COST,
     ("lqr", "UTurn"): _LOOP | _ANGLE | _TURN | _PUMPING | _UPHILL,
     ("lqr", "Level"): _LOOP | _ANGLE | _TURN | _PUMPING,
+    ("lqr", "UnknownBody"): _LOOP | _ANGLE | _TURN,
+    ("lqr", "Hills"): _LOOP | _LIMIT | _SPEED_COST | _PUMPING,
     ("lqr", "Walk"): _LOOP | _ANGLE,
     ("lqr", "Metastable"): _LOOP | _ANGLE | _PUMPING,
     ("lqr", "Slalom"): _GUIDED | {"ahead": (0.0, 6.0, False), "approach": (1.0, 30.0, True)},
-    ("lqr", "Waypoint"): _GUIDED | {"radius": (1.0, 8.0, True), "persistence": (0.0, 2.0, False)},
+    ("lqr", "Waypoint"): _TO_GOALS,
+    ("lqr", "Race"): _TO_GOALS | {"loop.pumping.downhill": (0.0, 0.045, False)},
 }
 """Of the numbers that are tuned, by agent and task and by their paths in the settings."""
 
@@ -181,7 +195,7 @@ def _near(trial: Trial, path: str, start: float, entry: Range) -> float:
         value = trial.suggest_float(path, start - reach, start + reach)
     value = min(max(value, low), high)
     # gaits are computed anew for each offset that pumps, so that few of those are tried
-    return round(value, 3) if "pumping" in path else float(f"{value:.{DIGITS}g}")
+    return round(value, 3) if "pumping." in path else float(f"{value:.{DIGITS}g}")
 
 
 # ---- learners

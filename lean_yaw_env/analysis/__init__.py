@@ -1,6 +1,7 @@
 """Gaits and their stability: section maps, limit cycles, modes, branches, maps, basins, demands."""
 
 from lean_yaw_env.analysis.active_map import COMMAND_PARAMETERS, ActiveMap, planar_gait_rate
+from lean_yaw_env.analysis.atlas import DESIGNS, Atlas, basin_sizes
 from lean_yaw_env.analysis.attraction import (
     Disturbance,
     LargestPushes,
@@ -31,17 +32,21 @@ from lean_yaw_env.analysis.limit_cycle import (
 from lean_yaw_env.analysis.passive_map import PassiveMap
 from lean_yaw_env.analysis.section_map import BODY_PARAMETERS, SectionMap, section_map_of
 from lean_yaw_env.analysis.storage import load_dataset, save_dataset
+from lean_yaw_env.engine import Engine
 
 __all__ = [
     "BODY_PARAMETERS",
     "COMMAND_PARAMETERS",
+    "DESIGNS",
     "ActiveMap",
+    "Atlas",
     "Branch",
     "Capture",
     "Choices",
     "ClosedLoopMap",
     "ControlInterface",
     "Disturbance",
+    "Engine",
     "Event",
     "FloorDemand",
     "LargestPushes",
@@ -51,6 +56,7 @@ __all__ = [
     "SectionMap",
     "StepDemand",
     "basin",
+    "basin_sizes",
     "capture",
     "capture_map",
     "continue_gait",

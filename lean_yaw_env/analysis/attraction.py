@@ -11,6 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lean_yaw_env.analysis.filling import (
+    Arrays,
+    Box,
+    Columns,
+    Layout,
+    fill_grid,
+    values_in,
+    write_box,
+)
 from lean_yaw_env.analysis.limit_cycle import LimitCycle, find_limit_cycle
 from lean_yaw_env.analysis.many_walks import ENDINGS, SURVIVED, walk_many
 from lean_yaw_env.analysis.section_map import (
@@ -19,7 +28,8 @@ from lean_yaw_env.analysis.section_map import (
     WalkerOrMap,
     section_map_of,
 )
-from lean_yaw_env.analysis.storage import Growing, require_axis
+from lean_yaw_env.analysis.storage import require_axis
+from lean_yaw_env.engine import ONE_THREAD, Engine
 from lean_yaw_env.parameters import QUARTER_TURN, Vector
 from lean_yaw_env.validation import (
     require_choice,
@@ -37,7 +47,6 @@ if TYPE_CHECKING:
 PUSHED = ("stance_pitch_rate", "ankle_rate")
 """Rates that a push changes, the first along the direction zero."""
 
-_CHUNK = 4096
 _DISTURBANCES, _PUSHES = 64, 32
 """Sizes tried at once of a disturbance and of a push; each round narrows the bracket by as much."""
 _BOUNDED = ("stance_pitch", "ankle_angle")
@@ -52,6 +61,7 @@ def basin(
     centre: Vector | None = None,
     n_steps: int = 60,
     path: str | Path | None = None,
+    engine: Engine = ONE_THREAD,
     progress: bool = False,
     **command: Unpack[CommandArguments],
 ) -> xarray.Dataset:
@@ -66,9 +76,8 @@ def basin(
         A state in the plane; by default the gait's. With it no gait is looked for.
     n_steps : int >= 1
         A walk of so many steps counts as survived. A fall comes within some ten of them; how long the way back takes is in the multipliers.
-    path : file name, optional
-        Where to keep what is done, whole or not at all; an interrupted basin goes on from there.
-    progress : bool
+    path, engine, progress : see ``fill_grid``
+        Called again with the same path, an interrupted basin goes on where it was.
     inter_leg_angle, mass_offset : see ``find_limit_cycle``
 
     Returns
@@ -81,7 +90,7 @@ def basin(
     Raises
     ------
     ValueError
-        If an argument is outside its range, or the file holds another basin.
+        If an argument is outside its range, or the store holds another basin.
     NoGaitError
         If there is no gait.
     """
@@ -92,29 +101,40 @@ def basin(
     x, y = (require_pair(*axis, "coordinate, values") for axis in (("x", x), ("y", y)))
     if x[0] == y[0]:
         raise ValueError(f"x and y must be different coordinates, got {x[0]!r} twice")
-    axes, states = section_grid(section_map, dict((x, y)), middle)
-    result: dict[str, Vector] = {
-        "steps": np.zeros(len(states)),
-        "ending": np.full(len(states), -1.0),
-    }
+    walks = _Walks(section_map, require_plane(section_map, dict((x, y))), middle, n_steps, cycle)
+    columns = {"ending": np.full(1, -1.0), "steps": np.zeros(1)}
     if cycle is not None:
-        result["distance"] = np.full(len(states), np.nan)
-    question = {**section_map.question(), "n_steps": n_steps}
+        columns["distance"] = np.full(1, np.nan)
     named = dict(zip(section_map.names, middle.round(12).tolist(), strict=True))
     meanings = json.dumps({str(int(key)): text for key, text in ENDINGS.items()})
-    growing = Growing(
-        "basin", axes, result, question, path, progress,
+    layout = Layout(
+        "basin", walks.axes, columns, {**section_map.question(), "n_steps": n_steps},
         attrs={"centre": json.dumps(named)}, notes={"ending": {"meanings": meanings}},
+        is_threadsafe=section_map.is_threadsafe,
     )  # fmt: skip
-    with growing:
-        for some in growing.chunks(result["ending"] < 0.0, _CHUNK):
-            walks = walk_many(section_map, states[some], n_steps)
-            result["steps"][some], result["ending"][some] = walks.steps, walks.endings
-            if cycle is not None:
-                on_foot = np.array([cycle.state, cycle.steps[0].state])[walks.steps % 2]
-                apart = np.abs(walks.states - on_foot)[:, section_map.free]
-                result["distance"][some] = apart.max(axis=1)
-    return growing.dataset()
+    return fill_grid(layout, walks, path, engine, progress)
+
+
+@dataclass(frozen=True)
+class _Walks:
+    """Walks from the states of a region."""
+
+    section_map: SectionMap
+    axes: dict[str, Vector]
+    centre: Vector
+    n_steps: int
+    cycle: LimitCycle | None
+
+    def __call__(self, arrays: Arrays, region: Box, number: int) -> int:
+        states = states_in(self.section_map, self.axes, region, self.centre)
+        walks = walk_many(self.section_map, states, self.n_steps)
+        columns: Columns = {"ending": walks.endings, "steps": walks.steps}
+        if self.cycle is not None:
+            on_foot = np.array([self.cycle.state, self.cycle.steps[0].state])[walks.steps % 2]
+            apart = np.abs(walks.states - on_foot)[:, self.section_map.free]
+            columns["distance"] = apart.max(axis=1)
+        write_box(arrays, region, columns)
+        return 0
 
 
 def require_centre(section_map: SectionMap, centre: Any) -> Vector:
@@ -125,25 +145,26 @@ def require_centre(section_map: SectionMap, centre: Any) -> Vector:
         raise ValueError(f"centre: {error}") from error
 
 
-def section_grid(
-    section_map: SectionMap, axes: Mapping[str, Sequence[float] | Vector], centre: Vector
-) -> tuple[dict[str, Vector], Vector]:
-    """The axes of a slice or box of the section, and the states (n, k) at its points, the other coordinates those of ``centre`` (k,).
-
-    Raises
-    ------
-    ValueError
-        If a name is no coordinate, or its values do not grow or leave its range.
-    """
+def require_plane(
+    section_map: SectionMap, axes: Mapping[str, Sequence[float] | Vector]
+) -> dict[str, Vector]:
+    """The axes of a slice or box of the section, or ``ValueError`` if a name is no coordinate, or its values do not grow or leave its range."""
     checked: dict[str, Vector] = {}
     for name, values in axes.items():
         _index(section_map, name)
         bound = QUARTER_TURN if name in _BOUNDED else 1e6
         checked[name] = require_axis(f"values of {name}", values, -bound, bound)
-    columns = [grid.ravel() for grid in np.meshgrid(*checked.values(), indexing="ij")]
-    states = np.tile(centre, (columns[0].size, 1))
-    states[:, [section_map.names.index(name) for name in checked]] = np.column_stack(columns)
-    return checked, states
+    return checked
+
+
+def states_in(
+    section_map: SectionMap, axes: Mapping[str, Vector], box: Box, centre: Vector
+) -> Vector:
+    """The states (n, k) of a part of a slice or box of the section, the other coordinates those of ``centre`` (k,)."""
+    columns = np.column_stack([*values_in(axes, box).values()])
+    states = np.tile(centre, (len(columns), 1))
+    states[:, [section_map.names.index(name) for name in axes]] = columns
+    return states
 
 
 @dataclass(frozen=True)

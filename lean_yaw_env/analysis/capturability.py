@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lean_yaw_env.analysis.active_map import ActiveMap
-from lean_yaw_env.analysis.attraction import require_centre, section_grid
+from lean_yaw_env.analysis.attraction import require_centre, require_plane, states_in
+from lean_yaw_env.analysis.filling import Arrays, Box, Columns, Layout, fill_grid, write_box
 from lean_yaw_env.analysis.limit_cycle import find_limit_cycle
 from lean_yaw_env.analysis.many_walks import raise_for_failures, walk_many
 from lean_yaw_env.analysis.section_map import (
@@ -27,7 +27,7 @@ from lean_yaw_env.analysis.section_map import (
     WalkerOrMap,
     section_map_of,
 )
-from lean_yaw_env.analysis.storage import Growing
+from lean_yaw_env.engine import ONE_THREAD, Engine
 from lean_yaw_env.kernel.records import STEPPED
 from lean_yaw_env.parameters import Vector, require_inter_leg_angle, require_mass_offset
 from lean_yaw_env.threads import MOST_THREADS, share_out
@@ -46,6 +46,10 @@ if TYPE_CHECKING:
 
 MOST_STEPS = 4
 """More chosen steps than these take too long: each multiplies the work by the number of commands."""
+_FIRST = ("inter_leg_angle", "mass_offset")
+"""Columns of a plan's first command."""
+_REGION = 2048
+"""Most states of a region of a map: each takes some thousand walks, and many more where two steps are chosen."""
 _CHUNK = 512
 """States at a time, so that memory does not grow with their number."""
 _LEAVES = 65_536
@@ -193,7 +197,7 @@ def capture(
                 least[some[saved]] = n
                 plans[some[saved], :n], plans[some[saved], n:] = found[saved], np.nan
 
-        share_out(work, waiting.size, threads if isinstance(section_map, ActiveMap) else 1)
+        share_out(work, waiting.size, threads if section_map.is_threadsafe else 1)
     return Capture(least, plans)
 
 
@@ -319,8 +323,8 @@ def capture_map(
     centre: Vector | None = None,
     most_steps: int = 2,
     settle_steps: int = 60,
-    threads: int = 1,
     path: str | Path | None = None,
+    engine: Engine = ONE_THREAD,
     progress: bool = False,
     **command: Unpack[CommandArguments],
 ) -> xarray.Dataset:
@@ -328,13 +332,12 @@ def capture_map(
 
     Parameters
     ----------
-    walker, choices, most_steps, settle_steps, threads, inter_leg_angle, mass_offset : see ``capture``
+    walker, choices, most_steps, settle_steps, inter_leg_angle, mass_offset : see ``capture``
     axes : one or more coordinates of the state, each with its values
     centre : shape (k,), optional
         A state that holds the other coordinates; by default the gait's.
-    path : file name, optional
-        Where to keep what is done, whole or not at all; an interrupted map goes on from there.
-    progress : bool
+    path, engine, progress : see ``fill_grid``
+        Called again with the same path, an interrupted map goes on where it was.
 
     Returns
     -------
@@ -345,44 +348,52 @@ def capture_map(
     Raises
     ------
     ValueError
-        If an argument is outside its range, or the file holds another map.
+        If an argument is outside its range, or the store holds another map.
     NoGaitError
         If there is no gait.
     SolverError
         If the integrator fails.
     """
     section_map = section_map_of(walker, **command)
-    _require_search(choices, most_steps, settle_steps, threads)
+    _require_search(choices, most_steps, settle_steps, 1)
     if not require_mapping("axes", axes):
         raise ValueError(f"axes must name one or more coordinates, got {axes!r}")
     if centre is None:
         middle = find_limit_cycle(section_map).state
     else:
         middle = require_centre(section_map, centre)
-    checked, states = section_grid(section_map, axes, middle)
-    result = {name: np.full(len(states), np.nan) for name in ("inter_leg_angle", "mass_offset")}
-    result["least_steps"] = np.full(len(states), -1.0)
+    search = _Captures(section_map, require_plane(section_map, axes), middle, choices, most_steps, settle_steps)  # fmt: skip
+    columns = {"least_steps": np.full(1, -1.0), **{name: np.full(1, np.nan) for name in _FIRST}}
     question = {
         **section_map.question(), "inter_leg_angles": choices.inter_leg_angles.tolist(), "mass_offsets": choices.mass_offsets.tolist(),
         "largest_change": choices.largest_change, "most_steps": most_steps, "settle_steps": settle_steps,
     }  # fmt: skip
     named = dict(zip(section_map.names, middle.round(12).tolist(), strict=True))
-    growing = Growing(
-        "capturability",
-        checked,
-        result,
-        question,
-        path,
-        progress,
-        attrs={"centre": json.dumps(named)},
-    )
-    with growing:
-        for some in growing.chunks(result["least_steps"] < 0.0, _CHUNK * threads):
-            found = capture(
-                section_map, states[some], choices, most_steps=most_steps, settle_steps=settle_steps, threads=threads
-            )  # fmt: skip
-            result["least_steps"][some] = found.least_steps
-            if most_steps:
-                first = found.plans[:, 0].T
-                result["inter_leg_angle"][some], result["mass_offset"][some] = first
-    return growing.dataset()
+    attrs = {"centre": json.dumps(named)}
+    layout = Layout(
+        "capturability", search.axes, columns, question, _REGION, attrs=attrs, is_threadsafe=section_map.is_threadsafe
+    )  # fmt: skip
+    return fill_grid(layout, search, path, engine, progress)
+
+
+@dataclass(frozen=True)
+class _Captures:
+    """Searches from the states of a region."""
+
+    section_map: SectionMap
+    axes: dict[str, Vector]
+    centre: Vector
+    choices: Choices
+    most_steps: int
+    settle_steps: int
+
+    def __call__(self, arrays: Arrays, region: Box, number: int) -> int:
+        states = states_in(self.section_map, self.axes, region, self.centre)
+        found = capture(
+            self.section_map, states, self.choices, most_steps=self.most_steps, settle_steps=self.settle_steps
+        )  # fmt: skip
+        columns: Columns = {"least_steps": found.least_steps}
+        if self.most_steps:
+            columns.update(zip(_FIRST, found.plans[:, 0].T, strict=True))
+        write_box(arrays, region, columns)
+        return 0

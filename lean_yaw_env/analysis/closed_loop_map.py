@@ -138,6 +138,7 @@ class ClosedLoopMap(SectionMap):
     start: Vector
     n_steps: int = 2
 
+    is_threadsafe = False  # a controller need not be able to answer two questions at once
     precision = 1e-6  # actions are rounded to some 1e-8
     neutral_within = 1e-5
     zero_explanation = (

@@ -18,7 +18,6 @@ from lean_yaw_env.kernel.batch import step_batch
 from lean_yaw_env.kernel.jacobian import step_jacobians
 from lean_yaw_env.kernel.records import STEPPED, Body, Outcome
 from lean_yaw_env.parameters import MIRROR, QUARTER_TURN, STATE_SIZE, Vector
-from lean_yaw_env.threads import share_out
 
 _JACOBIANS = 6
 """Most exact ones on the way to a fixed point."""
@@ -43,14 +42,13 @@ class WalkerGrid:
 
     ``bodies`` (n, 11) are in the order of ``kernel.records.Body``, ``inter_leg_angles`` (n,). ``offsets`` (n, 2) are in force while the left and
     while the right foot stands. Where a walker ``is_symmetric`` (n,), right steps mirror left ones; a gait is then a fixed point of one
-    mirrored step, otherwise of a stride. So many ``threads`` share each batch.
+    mirrored step, otherwise of a stride.
     """
 
     bodies: Vector
     inter_leg_angles: Vector
     offsets: Vector
     is_symmetric: Flags
-    threads: int = 1
 
     @property
     def n(self) -> int:
@@ -59,7 +57,7 @@ class WalkerGrid:
     def at(self, index: Index | Flags) -> WalkerGrid:
         """Some of the walkers."""
         return WalkerGrid(
-            self.bodies[index], self.inter_leg_angles[index], self.offsets[index], self.is_symmetric[index], self.threads
+            self.bodies[index], self.inter_leg_angles[index], self.offsets[index], self.is_symmetric[index]
         )  # fmt: skip
 
     def towards(self, share: Vector, *, width_first: bool) -> WalkerGrid:
@@ -98,7 +96,7 @@ class WalkerGrid:
             np.ascontiguousarray(states),
             np.full(self.n, 1.0 - 2.0 * foot),
         )
-        share_out(lambda first, last: kernel(*given, *results, first, last), self.n, self.threads)
+        kernel(*given, *results, 0, self.n)
 
     def residual(self, states: Vector) -> tuple[Vector, Flags]:
         """Change (n, 5) over a mirrored step of symmetric walkers, over a stride of others, and whether it was completed (n,).

@@ -1,16 +1,30 @@
-"""Maps of a walker's gait and its stability over one to three parameters, as labelled arrays."""
+"""Maps of a walker's gait and its stability over one to six parameters, as labelled arrays."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass
+from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lean_yaw_env.analysis.active_map import COMMAND_PARAMETERS, ActiveMap, planar_rate
+from lean_yaw_env.analysis.filling import (
+    PASSES,
+    Arrays,
+    Box,
+    Columns,
+    Layout,
+    fill_grid,
+    points_of,
+    read_box,
+    write_box,
+)
 from lean_yaw_env.analysis.fixed_point import solve_fixed_point
 from lean_yaw_env.analysis.gait_grid import GridGaits, WalkerGrid, follow_grid, solve_grid
 from lean_yaw_env.analysis.limit_cycle import (
@@ -26,12 +40,12 @@ from lean_yaw_env.analysis.section_map import (
     WalkerOrMap,
     section_map_of,
 )
-from lean_yaw_env.analysis.storage import Growing, require_axis, require_memory
+from lean_yaw_env.analysis.storage import require_axis
+from lean_yaw_env.engine import ONE_THREAD, Engine
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.records import Body, Outcome
 from lean_yaw_env.parameters import STATE_SIZE, Vector
-from lean_yaw_env.threads import MOST_THREADS
-from lean_yaw_env.validation import require_count, require_mapping
+from lean_yaw_env.validation import require_mapping
 
 if TYPE_CHECKING:
     import xarray
@@ -45,11 +59,10 @@ NUMBERS = (
 )  # fmt: skip
 """One value at each point: the largest multiplier's magnitude, and properties of ``LimitCycle``."""
 
-Columns = dict[str, NDArray[Any]]
-"""A map's variables, one row for each point."""
-
 _CHUNK = 2048
-"""Points at a time: what is needed beside the result does not grow with their number."""
+"""Points at a time: what is needed beside a region's result does not grow with their number."""
+_STARTS = 8
+"""Walkers that only pumping drives, among those of a chunk, for which a gait is looked for anew until one is found."""
 _NEAR = 0.1
 """A gait found from a neighbour's is its continuation if no coordinate differs by more."""
 
@@ -59,7 +72,7 @@ def stability_map(
     axes: Mapping[str, Sequence[float] | Vector],
     *,
     path: str | Path | None = None,
-    threads: int = 1,
+    engine: Engine = ONE_THREAD,
     progress: bool = False,
     **command: Unpack[CommandArguments],
 ) -> xarray.Dataset:
@@ -72,13 +85,10 @@ def stability_map(
     ----------
     walker : Walker, PassiveWalker or SectionMap
         Holds the parameters that are not on an axis.
-    axes : one to three names of parameters, each with its values
+    axes : one to six names of parameters, each with its values
         Names of the map's ``parameters``: ``BODY_PARAMETERS``, and for the active walker ``COMMAND_PARAMETERS``.
-    path : file name, optional
-        Where to keep what is done, whole or not at all. Called again with the same file, an interrupted map goes on where it was.
-    threads : int >= 1
-    progress : bool
-        Show a progress bar.
+    path, engine, progress : see ``fill_grid``
+        Called again with the same path, an interrupted map goes on where it was.
     inter_leg_angle, mass_offset : see ``find_limit_cycle``
 
     Returns
@@ -90,29 +100,73 @@ def stability_map(
     Raises
     ------
     ValueError
-        If an argument is outside its range, or the file holds another map.
+        If an argument is outside its range, or the store holds another map.
+    ClusterError
+        If workers cannot do their part.
     """
-    require_count("threads", threads, 1, MOST_THREADS)
     grid = _Grid(section_map_of(walker, **command), axes)
-    require_memory("axes", grid.n, _bytes(grid))
-    values = _empty(grid.section_map, grid.n)
-    values["status"][:] = NOT_YET
+    columns = _empty(grid.section_map, 1)
+    columns = {
+        "status": np.full(1, NOT_YET, np.int8),
+        **{name: columns[name] for name in columns if name != "status"},
+    }
     question = grid.section_map.question()
     question["parameters"] = {k: v for k, v in question["parameters"].items() if k not in grid.axes}
-    growing = Growing(
-        "stability map", grid.axes, values, question, path, progress,
+    layout = Layout(
+        "stability map", grid.axes, columns, question,
         dimensions={"state": "coordinate", "eigenvalue_real": "mode", "eigenvalue_imag": "mode"},
-        coords={"coordinate": list(grid.section_map.names)},
+        coords={"coordinate": list(grid.section_map.names)}, is_threadsafe=grid.section_map.is_threadsafe,
     )  # fmt: skip
-    with growing:
-        for chunk in growing.chunks(values["status"] == NOT_YET, _CHUNK):
-            for name, rows in gaits_at(grid.section_map, grid.points(chunk), None, threads).items():
-                values[name][chunk] = rows
-        fresh = np.flatnonzero(values["status"] == FOUND)
+    return fill_grid(layout, _Gaits(grid), path, engine, progress)
+
+
+@dataclass(frozen=True)
+class _Gaits:
+    """Finds the gaits of a region: in the first pass anew and from neighbours within, in later ones from those that neighbouring regions have found just before."""
+
+    grid: _Grid
+
+    def __call__(self, arrays: Arrays, region: Box, number: int) -> int:
+        box = region if number == 0 else _grown(region, self.grid.shape)
+        grid = self.grid.box(box)
+        inner = tuple(slice(s.start - b.start, s.stop - b.start) for s, b in zip(region, box, strict=True))  # fmt: skip
+        mine = np.zeros(grid.n, dtype=bool)
+        mine[points_of(inner, grid.shape)] = True
+        if number == 0:
+            values, passes = _empty(grid.section_map, grid.n), np.full(grid.n, -1, dtype=np.int16)
+            for first in range(0, grid.n, _CHUNK):
+                chunk = np.arange(first, min(first + _CHUNK, grid.n))
+                for name, rows in gaits_at(grid.section_map, grid.points(chunk), None).items():
+                    values[name][chunk] = rows
+            fresh = np.flatnonzero(values["status"] == FOUND)
+        else:
+            passes = read_box(arrays, PASSES, box)
+            fresh = np.flatnonzero(~mine & (passes == number - 1))
+            # what came later, or is left of a task that died, is not there yet
+            later = passes >= number
+            passes[later] = -1
+            if not fresh.size or (passes[mine] >= 0).all():
+                return 0
+            values = {name: read_box(arrays, name, box) for name in _empty(grid.section_map, 1)}
+            for name, row in _empty(grid.section_map, 1).items():
+                values[name][later] = row[0]
+        known = passes >= 0
+        passes[fresh[mine[fresh]]] = number
         while fresh.size:
-            fresh = _spread(grid, values, fresh, threads)
-            growing.save_if_due()
-    return growing.dataset()
+            fresh = _spread(grid, values, fresh, mine)
+            passes[fresh] = number
+        if number == 0 or (passes[mine] == number).any():
+            write_box(arrays, region, {name: rows[mine] for name, rows in values.items()})
+            write_box(arrays, region, {PASSES: passes[mine]})
+        return int((~known & (passes >= 0)).sum())
+
+
+def _grown(region: Box, shape: tuple[int, ...]) -> Box:
+    """A region with the points around it."""
+    return tuple(
+        slice(max(s.start - 1, 0), min(s.stop + 1, size))
+        for s, size in zip(region, shape, strict=True)
+    )
 
 
 def map_cost(
@@ -120,12 +174,12 @@ def map_cost(
     axes: Mapping[str, Sequence[float] | Vector],
     **command: Unpack[CommandArguments],
 ) -> tuple[float, float]:
-    """Estimate what a ``stability_map`` costs with one thread: bytes of memory, and seconds from some of its points on this machine."""
+    """Estimate what a ``stability_map`` costs with one thread: bytes of memory without a Zarr store, and seconds from some of its points on this machine."""
     grid = _Grid(section_map_of(walker, **command), axes)
     sample = np.linspace(0, grid.n - 1, min(grid.n, 16)).astype(np.intp)
-    gaits_at(grid.section_map, grid.points(sample[:1]), None, 1)  # compiles
+    gaits_at(grid.section_map, grid.points(sample[:1]), None)  # compiles
     began = time.process_time()
-    gaits_at(grid.section_map, grid.points(sample), None, 1)
+    gaits_at(grid.section_map, grid.points(sample), None)
     each = (time.process_time() - began) / len(sample)
     return grid.n * _bytes(grid), grid.n * each
 
@@ -141,8 +195,8 @@ class _Grid:
     def __init__(
         self, section_map: SectionMap, axes: Mapping[str, Sequence[float] | Vector]
     ) -> None:
-        if not 1 <= len(require_mapping("axes", axes)) <= 3:
-            raise ValueError(f"axes must name one to three parameters, got {list(axes)}")
+        if not 1 <= len(require_mapping("axes", axes)) <= 6:
+            raise ValueError(f"axes must name one to six parameters, got {list(axes)}")
         for name in axes:
             section_map = section_map.along(name)
         self.section_map = section_map
@@ -153,8 +207,20 @@ class _Grid:
             # each parameter has a range of its own, so that the ends speak for the values between
             for end in self.axes[name][[0, -1]].tolist():
                 section_map.moved(name, end)
-        self.shape = tuple(axis.size for axis in self.axes.values())
-        self.n = int(np.prod(self.shape))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return tuple(axis.size for axis in self.axes.values())
+
+    @property
+    def n(self) -> int:
+        return prod(self.shape)
+
+    def box(self, box: Box) -> _Grid:
+        """A part of the grid."""
+        part = copy(self)
+        part.axes = {name: axis[s] for (name, axis), s in zip(self.axes.items(), box, strict=True)}
+        return part
 
     def points(self, index: NDArray[np.intp]) -> dict[str, Vector]:
         """The parameters of some points."""
@@ -183,14 +249,14 @@ def _set_eigenvalues(
 
 
 def gaits_at(
-    section_map: SectionMap, points: Mapping[str, Vector], guesses: Vector | None, threads: int
+    section_map: SectionMap, points: Mapping[str, Vector], guesses: Vector | None
 ) -> Columns:
     """The map's variables, n rows each, where the map is moved to n points: by parameter, its values (n,).
 
     Gaits are looked for anew, or found from guesses (n, k) that are near them.
     """
     if isinstance(section_map, ActiveMap):
-        return _at_once(section_map, points, guesses, threads)
+        return _at_once(section_map, points, guesses)
     return _one_by_one(section_map, points, guesses)
 
 
@@ -221,9 +287,9 @@ def _one_by_one(
 
 
 def _at_once(
-    section_map: ActiveMap, points: Mapping[str, Vector], guesses: Vector | None, threads: int
+    section_map: ActiveMap, points: Mapping[str, Vector], guesses: Vector | None
 ) -> Columns:
-    grid = _walker_grid(section_map, points, threads)
+    grid = walker_grid(section_map, points)
     if guesses is not None:
         gaits = solve_grid(grid, guesses)
         distance = np.abs(gaits.states - guesses[gaits.index]).max(axis=1, initial=0.0)
@@ -236,10 +302,15 @@ def _at_once(
     values = _columns(section_map, grid, follow_grid(grid, starts))
     # where only pumping drives the walker: one gait, from which neighbours are found
     pumped = np.isnan(starts[:, 3]) & (grid.offsets[:, 0] != grid.offsets[:, 1])
-    for i in np.flatnonzero(pumped)[:1]:
+    candidates = np.flatnonzero(pumped)
+    for i in candidates[
+        np.linspace(0, candidates.size - 1, min(candidates.size, _STARTS), dtype=int)
+    ]:
         here = {name: array[i : i + 1] for name, array in points.items()}
         for name, rows in _one_by_one(section_map, here, None).items():
             values[name][i] = rows[0]
+        if values["status"][i] == FOUND:
+            break
     return values
 
 
@@ -262,7 +333,7 @@ def _columns(section_map: ActiveMap, grid: WalkerGrid, gaits: GridGaits) -> Colu
     return values
 
 
-def _walker_grid(section_map: ActiveMap, points: Mapping[str, Vector], threads: int) -> WalkerGrid:
+def walker_grid(section_map: ActiveMap, points: Mapping[str, Vector]) -> WalkerGrid:
     """The walkers at some points, as arrays."""
     n = len(next(iter(points.values())))
     bodies = np.tile(np.array(section_map.walker.parameters.body()), (n, 1))
@@ -273,13 +344,13 @@ def _walker_grid(section_map: ActiveMap, points: Mapping[str, Vector], threads: 
     )
     offsets = np.column_stack([mean + apart, mean - apart])
     symmetric = np.full(n, section_map.n_steps % 2 == 1)
-    return WalkerGrid(bodies, angles, offsets, symmetric, threads)
+    return WalkerGrid(bodies, angles, offsets, symmetric)
 
 
 def _spread(
-    grid: _Grid, values: Columns, fresh: NDArray[np.intp], threads: int
+    grid: _Grid, values: Columns, fresh: NDArray[np.intp], mine: NDArray[np.bool_]
 ) -> NDArray[np.intp]:
-    """Try the neighbours, where none was found, of points that have just got a gait, direction by direction; those found."""
+    """Try the neighbours (those of ``mine`` where none was found) of points that have just got a gait, direction by direction; those found."""
     places = np.array(np.unravel_index(fresh, grid.shape))
     found: list[NDArray[np.intp]] = []
     for axis, size in enumerate(grid.shape):
@@ -288,12 +359,12 @@ def _spread(
             there[axis] += step
             inside = (there[axis] >= 0) & (there[axis] < size)
             points = np.asarray(np.ravel_multi_index(tuple(there[:, inside]), grid.shape))
-            waits = values["status"][points] == NONE_FOUND
+            waits = mine[points] & (values["status"][points] == NONE_FOUND)
             points, sources = points[waits], fresh[inside][waits]
             for start in range(0, points.size, _CHUNK):
                 part = slice(start, start + _CHUNK)
                 here, guesses = points[part], values["state"][sources[part]]
-                rows = gaits_at(grid.section_map, grid.points(here), guesses, threads)
+                rows = gaits_at(grid.section_map, grid.points(here), guesses)
                 good = rows["status"] == FOUND
                 for name, column in rows.items():
                     values[name][here[good]] = column[good]

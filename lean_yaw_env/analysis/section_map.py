@@ -126,6 +126,8 @@ class SectionMap(ABC):
         Names of the parameters along which the map can be moved.
     zero_explanation : str
         Why the map has a multiplier of zero.
+    is_threadsafe : bool
+        Whether several threads may ask it at once.
     """
 
     walker: Walker | PassiveWalker
@@ -137,6 +139,7 @@ class SectionMap(ABC):
     neutral_within: ClassVar[float] = 0.0
     parameters: ClassVar[tuple[str, ...]] = BODY_PARAMETERS
     zero_explanation: ClassVar[str] = ""
+    is_threadsafe: ClassVar[bool] = True
 
     @property
     def motions(self) -> tuple[Motion, ...]:

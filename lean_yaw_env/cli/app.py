@@ -12,12 +12,13 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from lean_yaw_env.cli import plots, records
+from lean_yaw_env import plots
+from lean_yaw_env.cli import records
 from lean_yaw_env.cli.commands import Output, add_command, parse_axes, parse_range
+from lean_yaw_env.engine import Engine
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.passive import PassiveWalker
-from lean_yaw_env.threads import MOST_THREADS
-from lean_yaw_env.validation import require_count
+from lean_yaw_env.validation import require_count, require_text
 from lean_yaw_env.walker import Walker
 
 app = typer.Typer(
@@ -38,12 +39,27 @@ MassOffset = Annotated[
     float, typer.Option(help="Both masses moved along the axle, to the right, [-1, 1].")
 ]
 Out = Annotated[
-    Path | None, typer.Option(help="Keep the whole result in this netCDF file; resumes from it.")
+    str | None,
+    typer.Option(
+        help="Keep the whole result here and resume from it: a netCDF file (.nc), or a Zarr store's folder or URL, which may be larger than the memory."
+    ),
+]
+Threads = Annotated[int, typer.Option(help="Of this process.")]
+Workers = Annotated[
+    int | None, typer.Option(help="So many processes of this machine, by Dask, instead of threads.")
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(help="Address of a Dask scheduler, whose workers do the work: tcp://host:8786."),
 ]
 _MANY_POINTS = 10_000
-"""A map of more points says beforehand what it costs."""
-_RECORD = 2_000.0
-"""Bytes of a point among what is printed."""
+"""A map of more points says beforehand what it costs, and prints counts and ranges only."""
+
+
+def _shows_progress(engine: Engine) -> bool:
+    return sys.stderr.isatty() or not engine.is_local
+
+
 Speeds = Annotated[str, typer.Option(help="Speeds in m/s: a number or low:high:count.")]
 
 
@@ -74,49 +90,75 @@ def stability(
     axis: Annotated[
         list[str],
         typer.Argument(
-            help="One to three axes name=low:high:count: hip_width, foot_radius, ankle_tilt, "
+            help="One to six axes name=low:high:count: hip_width, foot_radius, ankle_tilt, "
             "slope, ankle_stiffness, ankle_damping, inter_leg_angle, mass_offset, "
             "alternating_offset."
         ),
     ],
     inter_leg_angle: InterLegAngle = 0.3,
     mass_offset: MassOffset = 0.0,
-    threads: Annotated[int, typer.Option(help="Of the compiled code.")] = 1,
+    threads: Threads = 1,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     out: Out = None,
 ) -> Output:
     """Find the gait and its stability at every point of a grid of parameters."""
     from lean_yaw_env.analysis import map_cost, stability_map
-    from lean_yaw_env.analysis.storage import require_memory
 
-    axes = parse_axes(axis)
+    axes, engine = parse_axes(axis), Engine(threads, workers, scheduler)
     points = math.prod(values.size for values in axes.values())
+    command = {"inter_leg_angle": inter_leg_angle, "mass_offset": mass_offset}
     if points > _MANY_POINTS:
-        require_count("threads", threads, 1, MOST_THREADS)
-        require_memory("axes", points, _RECORD)
-        size, seconds = map_cost(
-            walker, axes, inter_leg_angle=inter_leg_angle, mass_offset=mass_offset
-        )
-        size += points * _RECORD
+        size, seconds = map_cost(walker, axes, **command)
         typer.echo(
-            f"{points:,} points: about {size / 1e9:.2g} GB of memory and {seconds / 60.0 / threads:.2g} minutes",
+            f"{points:,} points: about {size / 1e9:.2g} GB and {seconds / 60.0:.2g} minutes of one core",
             err=True,
         )
     data = stability_map(
-        walker,
-        axes,
-        inter_leg_angle=inter_leg_angle,
-        mass_offset=mass_offset,
-        path=out,
-        threads=threads,
-        progress=sys.stderr.isatty(),
+        walker, axes, path=out, engine=engine, progress=_shows_progress(engine), **command
     )
-    points = records.map_records(data)
-    numbers = ("speed", "spectral_radius")
+    summary = records.grid_summary(data, "gait", ("speed", "spectral_radius"))
+    rows = records.map_records(data) if points <= _MANY_POINTS else []
     return Output(
-        {"counts": records.count_by(points, "gait"), "points": points},
-        lambda: records.show_grid("points", "gait", points, numbers),
+        {**summary, "points": rows},
+        lambda: records.show_grid("points", "gait", summary, rows),
         lambda: plots.map_figure(data),
     )
+
+
+@command()
+def atlas(
+    out: Annotated[str, typer.Option(help="Zarr store's folder or URL; resumes from it.")],
+    axis: Annotated[
+        list[str] | None,
+        typer.Argument(help="Other values of an axis than the atlas's: name=low:high:count."),
+    ] = None,
+    every: Annotated[
+        int, typer.Option(help="Basins at each so-many-th value of an axis only.")
+    ] = 3,
+    threads: Threads = 1,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+) -> Output:
+    """Find the gaits of ten million designs, and basins on a coarser grid: slope, inter-leg angle, foot radius, hip width, ankle tilt."""
+    from lean_yaw_env.analysis import DESIGNS, Atlas, basin_sizes, stability_map
+
+    require_text("out", out)
+    require_count("every", every)
+    axes, engine = {**DESIGNS, **parse_axes(axis or [])}, Engine(threads, workers, scheduler)
+    shown = _shows_progress(engine)
+    gaits = stability_map(Walker(), axes, path=f"{out}/gaits.zarr", engine=engine, progress=shown)
+    basins = basin_sizes(
+        gaits, every=every, path=f"{out}/basins.zarr", engine=engine, progress=shown
+    )
+    summary = records.grid_summary(gaits, "gait", ("speed", "greatest_friction"))
+    fastest = Atlas(gaits, basins).fastest_stable()
+
+    def show() -> None:
+        records.show_grid("designs", "gait", summary, [])
+        records.show_pairs("the fastest stable design", fastest)
+
+    return Output({**summary, "fastest_stable": fastest}, show)
 
 
 @command(draws=True)
@@ -127,11 +169,15 @@ def basin(
     inter_leg_angle: InterLegAngle = 0.3,
     mass_offset: MassOffset = 0.0,
     steps: Annotated[int, typer.Option(help="A walk of so many steps counts as survived.")] = 60,
+    threads: Threads = 1,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     out: Out = None,
 ) -> Output:
     """Walk from every point of a plane of the section through the gait: what it survives."""
     from lean_yaw_env.analysis import basin as basin_of
 
+    engine = Engine(threads, workers, scheduler)
     first, second = parse_axes([x, y]).items()
     data = basin_of(
         walker,
@@ -141,12 +187,14 @@ def basin(
         inter_leg_angle=inter_leg_angle,
         mass_offset=mass_offset,
         path=out,
-        progress=sys.stderr.isatty(),
+        engine=engine,
+        progress=_shows_progress(engine),
     )
-    starts = records.basin_records(data)
+    summary = records.grid_summary(data, "ending", ("steps",))
+    rows = records.basin_records(data) if data["ending"].size <= _MANY_POINTS else []
     return Output(
-        {"counts": records.count_by(starts, "ending"), "starts": starts},
-        lambda: records.show_grid("starts", "ending", starts, ("steps",)),
+        {**summary, "starts": rows},
+        lambda: records.show_grid("starts", "ending", summary, rows),
         lambda: plots.basin_figure(data),
     )
 

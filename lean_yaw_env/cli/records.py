@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 Record = dict[str, Any]
 _MAP_NUMBERS = ["speed", "step_length", "spectral_radius", "greatest_friction"]
 _MOST_ROWS = 12
+_PART = 2**20
+"""Points of a grid that are read at once."""
 
 
 def plain(value: Any) -> Any:
@@ -90,25 +93,53 @@ def gait_record(cycle: LimitCycle) -> Record:
     return record
 
 
+def grid_summary(data: xarray.Dataset, key: str, numbers: Sequence[str]) -> Record:
+    """``counts`` of points by gait or by ending, whichever is the key, and the ``ranges`` of some numbers; read a part at a time."""
+    counts, ranges = Counter[str](), dict[str, tuple[float, float]]()
+    for part in _parts(data):
+        counts.update(_KINDS[key](part).tolist())
+        for name in numbers:
+            values = part[name].to_numpy()
+            values = values[np.isfinite(values)]
+            if values.size:
+                least, most = ranges.get(name, (math.inf, -math.inf))
+                ranges[name] = min(least, float(values.min())), max(most, float(values.max()))
+    return {"counts": dict(counts.most_common()), "ranges": ranges}
+
+
+def _parts(data: xarray.Dataset) -> Iterator[xarray.Dataset]:
+    """A dataset by parts of its first axis, each of a million points or so."""
+    sizes = list(next(iter(data.data_vars.values())).sizes.items())
+    name, size = str(sizes[0][0]), sizes[0][1]
+    step = max(1, _PART // math.prod(each for _, each in sizes[1:]))
+    for first in range(0, size, step):
+        yield data.isel({name: slice(first, first + step)})
+
+
+def _gaits(part: xarray.Dataset) -> NDArray[np.str_]:
+    radius = part["spectral_radius"].to_numpy().ravel()
+    return np.where(np.isnan(radius), "none found", np.where(radius < 1.0, "stable", "unstable"))
+
+
+def _endings(part: xarray.Dataset) -> NDArray[np.str_]:
+    meanings = json.loads(part["ending"].attrs["meanings"])
+    kinds, which = np.unique(part["ending"].to_numpy().ravel(), return_inverse=True)
+    return np.array([meanings[str(int(kind))] for kind in kinds])[which]
+
+
+_KINDS = {"gait": _gaits, "ending": _endings}
+
+
 def map_records(data: xarray.Dataset) -> list[Record]:
     """One record for each point of a stability map."""
-    records = data[_MAP_NUMBERS].to_dataframe().reset_index().to_dict("records")
-    for record in records:
-        radius = record["spectral_radius"]
-        record["gait"] = "none found" if math.isnan(radius) else _stability(radius < 1.0)
-    return records  # pyright: ignore[reportReturnType]
-
-
-def _stability(is_stable: bool) -> str:
-    return "stable" if is_stable else "unstable"
+    table = data[_MAP_NUMBERS].to_dataframe().reset_index()
+    return table.assign(gait=_gaits(data)).to_dict("records")  # pyright: ignore[reportReturnType]
 
 
 def basin_records(data: xarray.Dataset) -> list[Record]:
     """One record for each start of a basin of attraction."""
-    meanings = json.loads(data["ending"].attrs["meanings"])
     table = data[["steps", "ending"]].to_dataframe().reset_index()
-    table["steps"] = table["steps"].astype(int)
-    table["ending"] = [meanings[str(int(ending))] for ending in table["ending"]]
+    table["steps"], table["ending"] = table["steps"].astype(int), _endings(data)
     return table.to_dict("records")  # pyright: ignore[reportReturnType]
 
 
@@ -135,11 +166,6 @@ def _by_speed(speeds: Vector, names: Sequence[str], values: Any) -> list[Record]
         {"speed": speed, **dict(zip(names, row, strict=True))}
         for speed, row in zip(speeds, values, strict=True)
     ]
-
-
-def count_by(records: Sequence[Record], key: str) -> dict[str, int]:
-    """How many records have each value of a key, the most frequent first."""
-    return dict(Counter(record[key] for record in records).most_common())
 
 
 def text_of(value: Any) -> str:
@@ -200,15 +226,10 @@ def show_gait(record: Record) -> None:
         show_records(f"this walker has {len(gaits)} gaits; the one described is the slowest", gaits)
 
 
-def show_grid(title: str, key: str, records: Sequence[Record], numbers: Sequence[str]) -> None:
-    """Points of a grid: how many have each value of a key, the ranges of some numbers, and the first points."""
-    show_pairs(f"{len(records)} {title} by {key}", count_by(records, key))
-    ranges = {}
-    for name in numbers:
-        values = [record[name] for record in records if math.isfinite(record[name])]
-        if values:
-            ranges[name] = (min(values), max(values))
-    show_pairs("from least to greatest", ranges)
+def show_grid(title: str, key: str, summary: Record, records: Sequence[Record]) -> None:
+    """Points of a grid: how many have each value of a key, the ranges of some numbers, and the first of the records."""
+    show_pairs(f"{sum(summary['counts'].values())} {title} by {key}", summary["counts"])
+    show_pairs("from least to greatest", summary["ranges"])
     show_records(title, records, "--json, --out or --plot")
 
 

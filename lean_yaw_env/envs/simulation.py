@@ -79,9 +79,10 @@ class Simulation:
         self.n = n = require_count("n", n)
         if max_episode_steps is not None:
             require_count("max_episode_steps", max_episode_steps)
-        self.parameters = options.for_task(task).parameters
+        own = options.for_task(task)
+        self.parameters = own.parameters
         self.settings = settings_of(options, task, max_episode_steps=max_episode_steps)
-        one_each = options.for_task(task).random_body != "nominal" or task.slope_varies
+        one_each = own.random_body != "nominal" or task.slope_varies
         self.bodies = np.tile(np.array(self.parameters.body()), (n if one_each else 1, 1))
         self.walkers: Records = np.zeros(n, WALKER)
         self.tasks: Records = np.zeros(n, task.record)

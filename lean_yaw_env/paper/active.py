@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from lean_yaw_env.analysis import continue_gait, planar_gait_rate, stability_map
+from lean_yaw_env.engine import Engine
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.paper.checks import Check, Result, assess, compare, names_of
 from lean_yaw_env.paper.drawing import (
@@ -109,7 +110,7 @@ def figure_13(slopes: int = 100, radii: int = 91) -> Result:
         "slope": np.linspace(_SLOPES_13[0] ** 0.5, _SLOPES_13[1] ** 0.5, slopes) ** 2,
         "foot_radius": np.linspace(*_RADII_13, radii),
     }
-    data = stability_map(flat_active_walker(), axes, threads=2)
+    data = stability_map(flat_active_walker(), axes, engine=Engine(threads=2))
     # The tilt plays no part in the speed, but not every tilt's gait is found from every start
     first, second = data["speed"].to_numpy()
     speeds, greatest = np.where(np.isnan(first), second, first), data["spectral_radius"].to_numpy()
@@ -243,7 +244,7 @@ def _any_combination_check() -> Check:
     }
     counts = []
     for hip_width in (0.0, WalkerParameters().hip_width):
-        data = stability_map(Walker(WalkerParameters(hip_width)), axes, threads=2)
+        data = stability_map(Walker(WalkerParameters(hip_width)), axes, engine=Engine(threads=2))
         counts.append(int((data["spectral_radius"] < 1.0).any("slope").sum()))
     return assess(
         "any combination", counts[0] == 75, f"{counts[0]} of 75; at d = 0.3 {counts[1]} of 75"

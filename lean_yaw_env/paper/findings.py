@@ -21,7 +21,7 @@ from lean_yaw_env.analysis import (
     section_map_of,
     stability_map,
 )
-from lean_yaw_env.analysis.attraction import section_grid
+from lean_yaw_env.analysis.attraction import require_plane, states_in
 from lean_yaw_env.files import write_text
 from lean_yaw_env.paper.drawing import FAINT, STABLE_FACE, name_axes, picture_of
 from lean_yaw_env.paper.report import write_columns
@@ -96,7 +96,8 @@ def compute(*, size: float = 1.0, progress: bool = False) -> Findings:
             for name in names
         }
 
-    _, sample = section_grid(section_map, around(PLANE, points(15)), gait)
+    plane = require_plane(section_map, around(PLANE, points(15)))
+    sample = states_in(section_map, plane, (slice(None), slice(None)), gait)
     coarse = Choices(np.linspace(0.15, 0.45, 3), np.linspace(-0.05, 0.05, 3))
     levels = refine_capture(SAVED, sample, coarse, most_levels=3, tolerance=0.0)
     pumping = {

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from lean_yaw_env.analysis import Branch, continue_gait, stability_map
+from lean_yaw_env.engine import Engine
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.paper.checks import Check, Result, assess, compare, printed
 from lean_yaw_env.paper.drawing import (
@@ -293,7 +294,7 @@ def active_surface(tilts: int = 79, widths: int = 45) -> Surface:
         "ankle_tilt": np.linspace(0.02, 0.8, tilts),
         "hip_width": np.linspace(0.0, 0.44, widths),
     }
-    data = stability_map(flat_active_walker(), axes, threads=2)
+    data = stability_map(flat_active_walker(), axes, engine=Engine(threads=2))
     grid = np.meshgrid(*axes.values(), indexing="ij")
     surface = Surface(grid[0], grid[1], data["spectral_radius"].to_numpy().copy())
     # Several gaits share the lower edge, and a search finds now the one, now the other: follow one

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.files import require_ending, written_whole
@@ -34,7 +34,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def panels(
-    count: int, columns: int, size: tuple[float, float], margin: tuple[float, float], **shared: bool
+    count: int, columns: int, size: tuple[float, float], margin: tuple[float, float], **shared: Any
 ) -> tuple[Figure, list[Axes]]:
     """A figure with so many panels, up to ``columns`` beside one another: ``size`` inches each, within a margin. ``shared`` may hold ``sharex`` and
     ``sharey``."""

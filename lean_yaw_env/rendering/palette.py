@@ -41,12 +41,14 @@ VIOLET: Colour = (120, 0, 220)
 BROWN: Colour = (80, 60, 0)
 NAVY: Colour = (20, 40, 140)
 CRIMSON: Colour = (220, 0, 60)
+LIGHT_GREEN: Colour = (140, 200, 100)
 
 AGENT_COLOURS: dict[str, Colour] = {
     "random": LIGHT_GREY,
     "fixed": BLACK,
     "feedback": ORANGE,
     "lqr": SKY_BLUE,
+    "linear": LIGHT_GREEN,
     "mpc": GREEN,
     "ppo": VERMILION,
     "sac": PURPLE,

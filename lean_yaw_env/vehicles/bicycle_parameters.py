@@ -144,6 +144,7 @@ class BicycleParameters:
 
 
 BENCHMARK_2007 = BicycleParameters()
+"""The benchmark bicycle of Meijaard et al. (2007), m, kg, rad."""
 
 
 def parameters_2005() -> BicycleParameters:

@@ -15,7 +15,7 @@ from agents.learning.sac import SACSettings
 from agents.learning.series import new_series, run_series
 from agents.tuning.study import Tuning, tune
 from lean_yaw_env import Walker
-from lean_yaw_env.analysis import basin, stability_map, storage
+from lean_yaw_env.analysis import basin, filling, stability_map
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.paper import reproduce, write_report
 
@@ -64,7 +64,7 @@ def _evaluation(folder: Path) -> Any:
 
 
 def _analysis(kind: str, folder: Path) -> Any:
-    storage.SAVED_EVERY = 0.0
+    filling.SAVED_EVERY = 0.0
     if kind == "map":
         axes = {"hip_width": np.linspace(0.1, 0.5, 70), "slope": np.linspace(0.005, 0.05, 70)}
         return stability_map(Walker(), axes, path=folder / "map.nc")

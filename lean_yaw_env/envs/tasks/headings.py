@@ -162,12 +162,49 @@ SPEED_CENTRE, SPEED_SCALE = 0.42, 0.1  # of the observed command
 SPEED_ERROR_SCALE = 0.1
 EACH_TRACKING_RATE = 0.4  # for heading and for speed
 SPEED_WIDTH = 0.05  # the speed error at which half of its tracking rate is left
+TRACKING_TEXT = (
+    f"{WALKING_RATE} + {EACH_TRACKING_RATE} / (1 + (heading error / {TRACKING_WIDTH})^2) + {EACH_TRACKING_RATE} / (1 + (speed "
+    f"error / {SPEED_WIDTH})^2)"
+)
+"""``tracking_rate`` in words."""
+
+
+def speed_fields(least: float, greatest: float) -> tuple[Field, ...]:
+    """What a task that commands speeds adds to the record of one that commands headings."""
+    return (
+        Field("commanded_speed", "", "commanded speed"),
+        Field("speed_error_sum", "time units", "absolute speed error times duration"),
+        Field("least_speed", "", "of the commanded ones", initial=least),
+        Field("greatest_speed", "", "of the commanded ones", initial=greatest),
+    )
+
+
+def speed_observed(centre: float, scale: float) -> tuple[Feature, ...]:
+    """What ``speed_features`` are, with the centre and scale of the commanded speed."""
+    return (
+        *HEADING.observed,
+        Feature("commanded_speed", scale, "", "commanded speed", centre),
+        Feature(
+            "speed_error",
+            SPEED_ERROR_SCALE,
+            "",
+            "commanded speed less the last step's; zero before the first step",
+        ),
+    )
+
+
+def speed_command(least: float, greatest: float) -> dict[str, Command]:
+    """The reset options of such a task."""
+    return {
+        **HEADING.commands,
+        "speed": Command(("commanded_speed",), least, greatest, "speed"),
+    }
 
 
 @formula
 def new_heading_and_speed(walker: Any, task: Any) -> None:
     new_heading(walker, task)
-    task.commanded_speed = uniform(walker, LEAST_SPEED, GREATEST_SPEED)
+    task.commanded_speed = uniform(walker, task.least_speed, task.greatest_speed)
 
 
 @formula
@@ -177,11 +214,17 @@ def speed_error(walker: Any, task: Any) -> Any:
 
 
 @formula
-def speed_reward(walker: Any, task: Any) -> Any:
+def tracking_rate(walker: Any, task: Any) -> Any:
+    """Reward per unit of time for walking and for both trackings."""
     close = closeness(heading_error(walker, task), TRACKING_WIDTH) + closeness(
         speed_error(walker, task), SPEED_WIDTH
     )
-    rate = WALKING_RATE + EACH_TRACKING_RATE * close - EFFORT_RATE * walker.effort
+    return WALKING_RATE + EACH_TRACKING_RATE * close
+
+
+@formula
+def speed_reward(walker: Any, task: Any) -> Any:
+    rate = tracking_rate(walker, task) - EFFORT_RATE * walker.effort
     return rate * walker.duration
 
 
@@ -204,25 +247,12 @@ def speed_features(walker: Any, task: Any) -> Any:
 SPEED_HEADING = replace(
     HEADING,
     name="SpeedHeading",
-    fields=(
-        *HEADING.fields,
-        Field("commanded_speed", "", "commanded speed"),
-        Field("speed_error_sum", "time units", "absolute speed error times duration"),
-    ),
+    fields=(*HEADING.fields, *speed_fields(LEAST_SPEED, GREATEST_SPEED)),
     start=new_heading_and_speed,
     reward=speed_reward,
     update=speed_update,
     features=speed_features,
-    observed=(
-        *HEADING.observed,
-        Feature("commanded_speed", SPEED_SCALE, "", "commanded speed", SPEED_CENTRE),
-        Feature(
-            "speed_error",
-            SPEED_ERROR_SCALE,
-            "",
-            "commanded speed less the last step's; zero before the first step",
-        ),
-    ),
+    observed=speed_observed(SPEED_CENTRE, SPEED_SCALE),
     metrics={
         **HEADING.metrics,
         "mean_absolute_speed_error": Metric("speed_error_sum", "time", "over time", "lower"),
@@ -230,12 +260,8 @@ SPEED_HEADING = replace(
     },
     summary=f"Walk where and as fast as you are told: a heading within {LARGEST_SLOPE_COMMAND} rad of downhill and a speed from "
     f"{LEAST_SPEED:.2f} to {GREATEST_SPEED:.2f}, commanded anew together every {SHORTEST_COMMAND} to {LONGEST_COMMAND} units of time.",
-    reward_text=f"{WALKING_RATE} + {EACH_TRACKING_RATE} / (1 + (heading error / {TRACKING_WIDTH})^2) + {EACH_TRACKING_RATE} / (1 + (speed "
-    f"error / {SPEED_WIDTH})^2) - {EFFORT_RATE} effort",
-    commands={
-        **HEADING.commands,
-        "speed": Command(("commanded_speed",), LEAST_SPEED, GREATEST_SPEED, "speed"),
-    },
+    reward_text=f"{TRACKING_TEXT} - {EFFORT_RATE} effort",
+    commands=speed_command(LEAST_SPEED, GREATEST_SPEED),
 )
 
 PUMPING = (
