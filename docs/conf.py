@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
 from pathlib import Path
 
@@ -15,6 +14,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
 import from_code
 
 import lean_yaw_env
+from lean_yaw_env.viewer import write_page
 
 project = "lean_yaw_env"
 author = copyright = "The lean_yaw_env developers"
@@ -84,8 +84,7 @@ def _plain(
 
 def _copy_page(app: Sphinx, error: Exception | None) -> None:
     if error is None and app.builder.name == "html":
-        page = ROOT / "lean_yaw_env" / "viewer" / "page"
-        shutil.copytree(page, Path(app.outdir) / "live", dirs_exist_ok=True)
+        write_page(Path(app.outdir) / "live")
 
 
 def setup(app: Sphinx) -> None:

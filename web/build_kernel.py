@@ -276,13 +276,14 @@ def tasks() -> dict[str, Any]:
     from task_entries import TASKS as offered
 
     from lean_yaw_env.envs.options import EnvOptions, settings_of
-    from lean_yaw_env.envs.state import SETTINGS, WALKER
+    from lean_yaw_env.envs.state import WALKER
+    from lean_yaw_env.registration import TASK_VERSIONS
 
     def fields(record: np.dtype) -> dict[str, Any]:
-        """Place of each field in words of eight bytes, negative for a count."""
+        """Place of each field in words of eight bytes; -1 less the place of a count."""
         places = record.fields or {}
         return {
-            name: -(place // 8) if kind.base.kind in "iu" else place // 8
+            name: -1 - place // 8 if kind.base.kind in "iu" else place // 8
             for name, (kind, place, *_) in places.items()
         }
 
@@ -295,6 +296,7 @@ def tasks() -> dict[str, Any]:
         own = options.for_task(task)
         settings = settings_of(options, task)
         described[task.name] = {
+            "id": f"{task.name}-v{TASK_VERSIONS[task.name]}",
             "summary": task.summary,
             "reward": task.reward_text,
             "fields": fields(task.record),

@@ -3,7 +3,6 @@ import { readdirSync, readFileSync } from "node:fs";
 import { dirname, join, relative } from "node:path";
 import { fileURLToPath } from "node:url";
 import { defineConfig, type Plugin } from "vite";
-import { agents } from "./agents_plugin";
 
 const HERE = dirname(fileURLToPath(import.meta.url));
 
@@ -27,7 +26,7 @@ const marked: Plugin = {
 // The built page goes into the Python package, which serves it and ships it in the wheel
 export default defineConfig({
   base: "./",
-  plugins: [marked, agents(join(HERE, "..", "agents"), JSON.parse(readFileSync(join(HERE, "src", "tasks", "tasks.json"), "utf-8")).tasks)],
+  plugins: [marked],
   build: {
     outDir: "../lean_yaw_env/viewer/page",
     emptyOutDir: true,

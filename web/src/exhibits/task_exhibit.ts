@@ -11,7 +11,7 @@ import { TaskMarks } from "../scene/task_marks";
 import { asTable } from "../share/files";
 import type { Settings } from "../share/link";
 import * as units from "../share/units";
-import { agentIndex, FIXED, loadPolicy, type Agent, type AgentIndex } from "../tasks/agents";
+import { agentIndex, FIXED, loadPolicy, type Agent, type AgentEntry, type AgentIndex, type PolicyAgent } from "../tasks/agents";
 import { TaskModule, TASKS, type Episode } from "../tasks/episode";
 import { Facts, h, section } from "../ui/dom";
 import { number } from "../ui/plot";
@@ -110,7 +110,7 @@ export class TaskExhibit implements Exhibit {
   private own: string | null = null;
   private index: AgentIndex = { agents: {}, references: {} };
   private module: TaskModule | null = null;
-  private policies = new Map<string, Agent>();
+  private policies = new Map<string, PolicyAgent>();
   private runners: Runner[] = [];
   private steering = 0;
   private stride_ = 0;
@@ -179,15 +179,23 @@ export class TaskExhibit implements Exhibit {
   }
 
   private offered(): string[] {
-    return [YOU, "fixed", ...Object.keys(this.index.agents[this.task] ?? {}), ...(this.own ? [OWN] : [])];
+    return [YOU, "fixed", ...Object.keys(this.shipped()), ...(this.own ? [OWN] : [])];
+  }
+
+  /** Trained agents that see what this task shows here. */
+  private shipped(): Record<string, AgentEntry> {
+    const seen = TASKS[this.task].observation.join();
+    const entries = Object.entries(this.index.agents[TASKS[this.task].id] ?? {});
+    return Object.fromEntries(entries.filter(([, { observation }]) => observation.join() === seen));
   }
 
   private async agent(name: string): Promise<Agent> {
     if (name === YOU) return { act: () => this.action() };
     if (name === "fixed") return FIXED;
-    const place = name === OWN ? this.own! : `agents/${this.task}-${name}`;
-    if (!this.policies.has(place)) this.policies.set(place, await loadPolicy(place, TASKS[this.task].observation));
-    return this.policies.get(place)!;
+    const { id, observation } = TASKS[this.task];
+    const place = name === OWN ? this.own! : `agents/${id}/${name}/seed${this.index.agents[id]?.[name]?.seeds[0] ?? 0}/policy`;
+    if (!this.policies.has(place)) this.policies.set(place, await loadPolicy(place, observation));
+    return this.policies.get(place)!.fresh();
   }
 
   /** The visitor's action: keys steer to the right or left in space; a gait of pumping goes on by itself. */
@@ -399,12 +407,12 @@ export class TaskExhibit implements Exhibit {
   }
 
   private row(runner: Runner, k: number): HTMLElement {
-    const known = this.index.agents[this.task]?.[runner.name];
+    const known = this.shipped()[runner.name];
     return h("tr", { "data-walker": runner.name, "data-score": runner.shown.total, "data-state": runner.state },
       h("td", {}, h("span", { class: "mark", style: `background:${COLOURS[k]}` }), called(runner.name)),
       h("td", { class: "num" }, runner.state),
       h("td", { class: "num" }, number(runner.shown.total, 1)),
-      h("td", { class: "num", title: known ? `${known.seeds} trainings` : "" }, known ? number(known.means.return, 1) : "–"));
+      h("td", { class: "num", title: known ? `${known.seeds.length} trainings` : "" }, known ? number(known.means.return, 1) : "–"));
   }
 }
 

@@ -8,10 +8,16 @@ export interface Agent {
 /** The paper's controller: no action. */
 export const FIXED: Agent = { act: () => [0, 0] };
 
-/** What the built page knows of a task's agents: how many seeds were trained, and their means over held-out episodes by metric. */
+/** An algorithm's agents at a task: seeds of their trainings, what they observe, and means of their scores over held-out episodes. */
+export interface AgentEntry {
+  seeds: number[];
+  observation: string[];
+  means: Record<string, number>;
+}
+
+/** The agents beside the page by task (with its version) and algorithm; of each task's headline the fixed controller's mean and the reference. */
 export interface AgentIndex {
-  agents: Record<string, Record<string, { seeds: number; means: Record<string, number> }>>;
-  /** Of each task's headline: the fixed controller's mean and the reference. */
+  agents: Record<string, Record<string, AgentEntry>>;
   references: Record<string, { metric: string; fixed: number; value: number }>;
 }
 
@@ -45,35 +51,59 @@ function readSafetensors(file: ArrayBuffer): Map<string, Float32Array> {
   return arrays;
 }
 
-/** A trained network without memory: normalised observations in, actions out. */
+const sigmoid = (x: number) => 0.5 + 0.5 * Math.tanh(0.5 * x);
+
+/** A trained network: normalised observations in, actions out. It may remember its latest observations, or the state of an LSTM. */
 export class PolicyAgent implements Agent {
   private readonly layers: Layer[] = [];
   private readonly mean: Float32Array;
   private readonly scale: number[];
+  private frames: number[];
+  private hidden: number[];
+  private cell: number[];
 
-  constructor(private readonly card: PolicyCard, weights: Map<string, Float32Array>) {
+  constructor(private readonly card: PolicyCard, private readonly weights: Map<string, Float32Array>) {
     for (let k = 0; weights.has(`layers.${k}.weight`); k++) {
       this.layers.push({ weight: weights.get(`layers.${k}.weight`)!, bias: weights.get(`layers.${k}.bias`)! });
     }
     this.mean = weights.get("observation_mean")!;
     this.scale = Array.from(weights.get("observation_variance")!, (variance) => 1 / Math.sqrt(variance + FLOOR));
-    if (weights.has("memory.bias") || this.mean.length !== card.observation.names.length) {
-      throw new Error("The page reads policies without a memory only.");
-    }
+    const units = (weights.get("memory.bias")?.length ?? 0) / 4;
+    this.frames = Array(this.mean.length).fill(0);
+    this.hidden = Array(units).fill(0);
+    this.cell = Array(units).fill(0);
+  }
+
+  /** The same network at the start of an episode, with nothing to remember. */
+  fresh(): PolicyAgent {
+    return new PolicyAgent(this.card, this.weights);
   }
 
   act(observation: ArrayLike<number>): number[] {
-    let signal = this.scale.map((scale, k) => Math.min(Math.max((observation[k] - this.mean[k]) * scale, -LIMIT), LIMIT));
-    this.layers.forEach(({ weight, bias }, k) => {
+    this.frames = [...this.frames.slice(observation.length), ...Array.from(observation)];
+    let signal = this.frames.map((value, k) => Math.fround(Math.min(Math.max((value - this.mean[k]) * this.scale[k], -LIMIT), LIMIT)));
+    if (this.hidden.length) signal = this.remember(signal);
+    this.layers.forEach((layer, k) => {
       const shape = k === this.layers.length - 1 ? OUTPUTS[this.card.output] : ACTIVATIONS[this.card.activation];
-      signal = Array.from(bias, (value, row) => {
-        let sum = value;
-        for (let column = 0; column < signal.length; column++) sum += weight[row * signal.length + column] * signal[column];
-        return shape(sum);
-      });
+      signal = linear(layer, signal).map(shape);
     });
     return signal;
   }
+
+  /** The next state of the LSTM: input, forget, cell and output gates. */
+  private remember(signal: number[]): number[] {
+    const weight = (name: string) => this.weights.get(`memory.${name}`)!;
+    const fromState = linear({ weight: weight("state"), bias: new Float32Array(weight("bias").length) }, this.hidden);
+    const gates = linear({ weight: weight("input"), bias: weight("bias") }, signal).map((value, k) => value + fromState[k]);
+    const n = this.hidden.length;
+    this.cell = this.cell.map((cell, k) => sigmoid(gates[n + k]) * cell + sigmoid(gates[k]) * Math.tanh(gates[2 * n + k]));
+    this.hidden = this.cell.map((cell, k) => sigmoid(gates[3 * n + k]) * Math.tanh(cell));
+    return this.hidden;
+  }
+}
+
+function linear({ weight, bias }: Layer, signal: number[]): number[] {
+  return Array.from(bias, (value, row) => signal.reduce((sum, each, column) => sum + weight[row * signal.length + column] * each, value));
 }
 
 const beside = (name: string) => new URL(name, document.baseURI);

@@ -10,6 +10,8 @@ import address from "./tasks.wasm?url";
 type Fields = Record<string, number>;
 
 export interface TaskDescription {
+  /** Name and version. */
+  id: string;
   summary: string;
   reward: string;
   fields: Fields;
