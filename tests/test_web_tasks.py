@@ -14,16 +14,22 @@ from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.simulation import Simulation
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.registration import NAMESPACE, TASK_VERSIONS
-from lean_yaw_env.viewer import PAGE, PageServer
+from lean_yaw_env.viewer import PageServer
 from tests.browser import PATIENCE, chromium
 from tests.test_web_kernel import build_kernel
 
-EPISODES, STEPS = 40, 100
-# Sines, exponentials and arc tangents are the C library's, in the page another one than here: where they are drawn from or observed, numbers
-# differ by their rounding, grown by a hundred steps. Single precision has six times a hundred-millionth of its own.
-ROUNDING = 2e-6
-LIBRARY = ("Slalom", "Hills", "Waypoint", "Race", "UTurn", "LevelUphill")
-"""Tasks with such functions in what they draw or observe; all others have the same bits."""
+STEPS = 100
+EPISODES = {"Metastable": 150, "Level": 300, "LevelUphill": 200, "Energy": 300}
+"""Tasks in which random actions soon end in a fall take more episodes than the 40 of the others for as many steps."""
+# WebAssembly orders sums of a reward in another way.
+REWARD = 1e-12
+# The slope of Hills is a sum of sines, which are another C library's in the page; their rounding grows from step to step. Numbers are in single
+# precision; a fall makes them ten times as large, and a hundred times as sensitive.
+SLOPE, SLOPE_AT_FALL = 2e-6, 1e-3
+
+
+# Columns of the rows that are compared
+ENDS, REWARDS, FELL, SEEN = [0, 1, 3, 4], 2, 3, slice(5, None)
 
 
 @pytest.fixture(scope="module")
@@ -88,19 +94,21 @@ def in_the_package(task, keys, actions):
 
 @pytest.mark.parametrize("task", TASK_VERSIONS)
 def test_episodes_have_the_packages_observations_and_rewards(page, task):
-    rng = np.random.default_rng(1)
-    keys = rng.integers(0, 2**64, EPISODES, dtype=np.uint64).tolist()
+    rng, n = np.random.default_rng(1), EPISODES.get(task, 40)
+    keys = rng.integers(0, 2**64, n, dtype=np.uint64).tolist()
     pump = json.loads(build_kernel.TASKS.read_text())["tasks"][task]["pump"]
-    spread = rng.uniform(0.05, 0.5, (1, EPISODES, 1))
-    actions = rng.uniform(-1.0, 1.0, (STEPS, EPISODES, 2)) * spread + [0.0, pump]
-    actions = np.clip(actions, -1.0, 1.0).astype(np.float32)
+    actions = rng.uniform(-1.0, 1.0, (STEPS, n, 2)) * rng.uniform(0.05, 0.5, (1, n, 1))
+    actions = np.clip(actions + [0.0, pump], -1.0, 1.0).astype(np.float32)
     expected, ours = in_the_package(task, keys, actions), on_the_page(page, task, keys, actions)
-    print(task, len(expected), np.abs(ours - expected).max() if ours.shape == expected.shape else (ours.shape, expected.shape))
-    assert len(expected) > 1000
-    if task in LIBRARY:
-        np.testing.assert_allclose(ours, expected, rtol=0.0, atol=ROUNDING)
-    else:
-        assert np.array_equal(ours, expected)
+    assert len(expected) > 1500
+    assert np.array_equal(ours[:, ENDS], expected[:, ENDS])
+    np.testing.assert_allclose(ours[:, REWARDS], expected[:, REWARDS], rtol=0.0, atol=1e-3 if task == "Hills" else REWARD)
+    if task != "Hills":
+        assert np.array_equal(ours[:, SEEN], expected[:, SEEN])
+        return
+    walks = expected[:, FELL] == 0.0
+    for rows, tolerance in ((walks, SLOPE), (~walks, SLOPE_AT_FALL)):
+        np.testing.assert_allclose(ours[rows, SEEN], expected[rows, SEEN], rtol=0.0, atol=tolerance)
 
 
 def shipped():
@@ -112,7 +120,7 @@ def shipped():
             yield env_id, place.name, shipped_seeds(env_id, place.name)[0]
 
 
-@pytest.mark.parametrize(("env_id", "algorithm", "seed"), shipped())
+@pytest.mark.parametrize(("env_id", "algorithm", "seed"), list(shipped()))
 def test_policies_act_on_the_page_as_in_the_package(page, env_id, algorithm, seed):
     policy = agents.load(env_id, algorithm=algorithm, seed=seed)
     names = list(policy.card.layout.names)
@@ -128,6 +136,5 @@ def test_policies_act_on_the_page_as_in_the_package(page, env_id, algorithm, see
         }""",
         [f"agents/{place}/policy", names, observations.tolist()],
     )
-    # the package multiplies matrices in single precision, the page sums in double precision
-    np.testing.assert_allclose(np.array(ours), expected, rtol=0.0, atol=1e-4)
-    print(np.abs(ours - expected).max())
+    # the package multiplies matrices in single precision, the page sums in double precision: 5e-7 was the largest difference
+    np.testing.assert_allclose(np.array(ours), expected, rtol=0.0, atol=5e-6)

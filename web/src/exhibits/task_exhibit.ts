@@ -15,6 +15,7 @@ import { agentIndex, FIXED, loadPolicy, type Agent, type AgentEntry, type AgentI
 import { TaskModule, TASKS, type Episode } from "../tasks/episode";
 import { Facts, h, section } from "../ui/dom";
 import { number } from "../ui/plot";
+import { Slider } from "../ui/slider";
 import { fact, steeringBar } from "./walk_exhibit";
 
 const MOST_WALKERS = 4;
@@ -24,6 +25,10 @@ const YOU = "you";
 /** A policy served beside the page: `lean-yaw view --agent-path FOLDER`. */
 const OWN = "own";
 const STRIDE_CHANGE = 0.25;
+/** Episodes of more time than this last until a fall. */
+const LONG = 1000;
+/** Tasks to begin with, as challenges. */
+const CHALLENGES: [string, string][] = [["Reach the goals", "Waypoint"], ["Slalom", "Slalom"], ["Stay up under pushes", "Metastable"], ["Race through gates", "Race"]];
 /** Leg lengths of a path that are drawn behind and ahead of the walker. */
 const PATH_BEHIND = 6;
 const PATH_AHEAD = 24;
@@ -53,7 +58,7 @@ class Runner {
   constructor(app: App, readonly name: string, readonly episode: Episode, private readonly agent: Agent, tint: string, onEnd: (runner: Runner) => void) {
     const start = { state: episode.state, side: episode.side, contact: [0, 0] as [number, number], offset: episode.walker("mass_offset") };
     this.walk = new Walk(app.kernel, "steered", start, () => this.order());
-    this.staged = new StagedWalk(this.walk, app.stage, tint);
+    this.staged = new StagedWalk(this.walk, app.stage, tint, tint !== "");
     this.walk.onStep = () => {
       this.staged.begin();
       if (this.isOver) onEnd(this);
@@ -90,6 +95,13 @@ class Runner {
     if (!this.isOver || this.fall) this.walk.advance(duration);
   }
 
+  /** What the task is measured by: a measure of its own, or the sum of rewards; the time walked, where the time to a fall counts. */
+  get score(): number {
+    const { headline } = this.episode.task;
+    if (headline === "return") return this.shown.total;
+    return this.shown.metrics[headline] ?? this.shown.time;
+  }
+
   get state(): string {
     if (this.fall) return this.fall.name;
     if (!this.isOver) return "walks";
@@ -102,8 +114,8 @@ export class TaskExhibit implements Exhibit {
   readonly isSteered = true;
   readonly isPushed = false;
   readonly id = "tasks";
-  readonly title = "Tasks";
-  readonly subtitle = "Steer for a score, beside trained policies";
+  readonly title = "Play";
+  readonly subtitle = "Tasks of the suite: your score beside trained agents'";
   private task = "Heading";
   private seed = 1;
   private chosen = [YOU];
@@ -113,7 +125,6 @@ export class TaskExhibit implements Exhibit {
   private policies = new Map<string, PolicyAgent>();
   private runners: Runner[] = [];
   private steering = 0;
-  private stride_ = 0;
   private isHere = false;
   private started = 0;
   private aside = 0;
@@ -123,10 +134,15 @@ export class TaskExhibit implements Exhibit {
     ...Object.keys(TASKS).map((name) => h("option", { value: name }, name)));
   private readonly summary = h("p", { class: "story", id: "task-summary" });
   private readonly reward = h("p", { class: "note" });
+  private readonly strideSlider = new Slider({
+    id: "task-stride", label: "Your stride", hint: "The angle between your legs: longer steps turn faster, shorter ones are safer (arrow keys up and down)",
+    low: -1, high: 1, step: STRIDE_CHANGE, value: 0, show: (value) => units.angle(0.3 + 0.15 * value), onInput: () => {},
+  }); // prettier-ignore
+  private readonly scoring = h("p", { class: "note", id: "task-scoring" });
   private readonly choices = h("div", { class: "row wrap", role: "group", "aria-label": "Who walks" });
   private readonly rows = h("tbody");
   private readonly facts = new Facts();
-  private readonly measures = section("Measures", true, this.facts.element);
+  private readonly measures = section("Measures", false, this.facts.element);
   private panels: Node[] = [];
 
   constructor(private readonly app: App) {}
@@ -201,7 +217,7 @@ export class TaskExhibit implements Exhibit {
   /** The visitor's action: keys steer to the right or left in space; a gait of pumping goes on by itself. */
   private action(): number[] {
     const side = this.runners.find(({ name }) => name === YOU)?.episode.side ?? 1;
-    return [this.stride_, side * this.steering + TASKS[this.task].pump];
+    return [this.strideSlider.value, side * this.steering + TASKS[this.task].pump];
   }
 
   /** Put all chosen walkers at the start of the episode. */
@@ -220,7 +236,7 @@ export class TaskExhibit implements Exhibit {
     }
     if (turn !== this.started || !this.isHere || !this.module) return; // another one was asked for meanwhile
     this.clear();
-    this.stride_ = 0;
+    this.strideSlider.value = 0;
     for (const [k, [name, agent]] of agents.entries()) {
       this.runners.push(new Runner(this.app, name, this.module.episode(task, key), agent, TINTS[k], () => this.ended()));
     }
@@ -281,8 +297,8 @@ export class TaskExhibit implements Exhibit {
       if (first.fall) this.app.notice(h("div", { class: "card fall", id: "fall" }, h("strong", {}, `${called(first.name)} fell: ${first.fall.name}. `), first.fall.why));
       return;
     }
-    const ranked = [...this.runners].sort((a, b) => b.shown.total - a.shown.total);
-    const list = ranked.map((runner) => h("li", {}, `${called(runner.name)}: ${number(runner.shown.total, 1)} (${runner.state})`));
+    const ranked = [...this.runners].sort((a, b) => b.score - a.score);
+    const list = ranked.map((runner) => h("li", {}, `${called(runner.name)}: ${number(runner.score, 1)} (${runner.state})`));
     this.app.notice(
       h("div", { class: "card", id: "result" }, h("strong", {}, "The episode is over."), h("ol", {}, ...list),
         h("div", { class: "row" }, h("button", { type: "button", class: "primary", onclick: () => this.another() }, "Another one"),
@@ -316,7 +332,7 @@ export class TaskExhibit implements Exhibit {
   }
 
   stride(direction: number): void {
-    this.stride_ = Math.min(Math.max(this.stride_ + STRIDE_CHANGE * direction, -1), 1);
+    this.strideSlider.value = Math.min(Math.max(this.strideSlider.value + STRIDE_CHANGE * direction, -1), 1);
   }
 
   get isMoving(): boolean {
@@ -356,15 +372,17 @@ export class TaskExhibit implements Exhibit {
 
   private build(): Node[] {
     return [
-      h("div", { class: "section-body" },
-        h("div", { class: "row" }, h("label", { for: "task" }, "Task"), this.taskMenu,
-          h("button", { type: "button", class: "small", id: "another", onclick: () => this.another() }, "Another episode"))),
       this.summary,
+      section("Task", true,
+        h("div", { class: "row wrap" }, ...CHALLENGES.map(([words, task]) =>
+          h("button", { type: "button", class: "small", "data-task": task, onclick: () => this.open(task) }, words))),
+        h("div", { class: "row" }, h("label", { for: "task" }, "All tasks"), this.taskMenu,
+          h("button", { type: "button", class: "small", id: "another", onclick: () => this.another() }, "Another episode")),
+        this.reward),
       section("Who walks", true, this.choices,
         h("table", { class: "modes", id: "scores" },
           h("thead", {}, h("tr", {}, ...["Walker", "", "Score", "Mean score"].map((name) => h("th", { scope: "col" }, name)))), this.rows),
-        h("p", { class: "note" }, "The score is the sum of rewards. A mean score is that of all trainings of a policy, over held-out episodes."),
-        this.reward),
+        this.scoring, this.strideSlider.element),
       this.measures,
     ]; // prettier-ignore
   }
@@ -374,6 +392,10 @@ export class TaskExhibit implements Exhibit {
     this.taskMenu.value = this.task;
     this.summary.textContent = task.summary;
     this.reward.textContent = `Reward per unit of time: ${task.reward}.`;
+    const measure = { return: "sum of rewards", time_per_fall: "time walked before a fall" }[task.headline] ?? task.headline.replaceAll("_", " ");
+    const best = this.index.references[this.task];
+    this.scoring.textContent = `Score: ${measure}. Mean score: over held-out episodes and all trainings of an agent.` +
+      (best ? ` The best that a search has found: ${number(best.value, 1)} on average.` : "");
     this.choices.replaceChildren(...this.offered().map((name) => {
       const box = h("input", { type: "checkbox", id: `walker-${name}`, checked: this.chosen.includes(name), onchange: () => this.choose(name, box.checked) });
       return h("label", { class: "check" }, box, called(name));
@@ -398,8 +420,8 @@ export class TaskExhibit implements Exhibit {
     if (!this.runners.length) return;
     const { shown, walk, episode } = this.leader;
     this.app.hud.replaceChildren(
-      fact("time left", units.time(Math.max(episode.task.horizon - shown.time, 0), 0)),
-      ...this.runners.map(({ name, shown: { total } }) => fact(called(name), number(total, 1))),
+      episode.task.horizon > LONG ? fact("time", units.time(shown.time, 0)) : fact("time left", units.time(Math.max(episode.task.horizon - shown.time, 0), 0)),
+      ...this.runners.map(({ name, score }) => fact(called(name), number(score, 1))),
       steeringBar(walk.pose().offset),
     );
     this.rows.replaceChildren(...this.runners.map((runner, k) => this.row(runner, k)));
@@ -408,11 +430,13 @@ export class TaskExhibit implements Exhibit {
 
   private row(runner: Runner, k: number): HTMLElement {
     const known = this.shipped()[runner.name];
-    return h("tr", { "data-walker": runner.name, "data-score": runner.shown.total, "data-state": runner.state },
+    const fixed = this.index.references[this.task];
+    const mean = runner.name === "fixed" ? fixed?.fixed : known?.means[TASKS[this.task].headline];
+    return h("tr", { "data-walker": runner.name, "data-score": runner.score, "data-state": runner.state },
       h("td", {}, h("span", { class: "mark", style: `background:${COLOURS[k]}` }), called(runner.name)),
       h("td", { class: "num" }, runner.state),
-      h("td", { class: "num" }, number(runner.shown.total, 1)),
-      h("td", { class: "num", title: known ? `${known.seeds.length} trainings` : "" }, known ? number(known.means.return, 1) : "–"));
+      h("td", { class: "num" }, number(runner.score, 1)),
+      h("td", { class: "num", title: known ? `${known.seeds.length} trainings` : "" }, mean === undefined ? "–" : number(mean, 1)));
   }
 }
 

@@ -21,9 +21,9 @@ export class StagedWalk {
   private path: Vector[] = [];
   private drawn = 0;
 
-  /** `tint` tells several walkers apart; without one, left and right have their own colours. */
-  constructor(readonly walk: Walk, private readonly stage: Stage, private readonly tint = "") {
-    this.model = new WalkerModel(tint || undefined);
+  /** `tint` tells several walkers apart; without one, left and right have their own colours. A ghost is seen through. */
+  constructor(readonly walk: Walk, private readonly stage: Stage, private readonly tint = "", isGhost = false) {
+    this.model = new WalkerModel(tint || undefined, isGhost);
     this.trail = new Trail(tint || PALETTE.path);
     stage.world.add(this.model.group, this.trail.group, this.prints.mesh);
     this.resize();
