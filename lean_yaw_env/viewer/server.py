@@ -99,7 +99,8 @@ class PageServer:
     task : str, optional
         The name of a task, as Slalom, which the page opens instead.
     agents : names
-        Who walks that task, side by side: algorithms of trained agents, as ppo, the paper's controller, ``fixed``, and the visitor, ``you``.
+        Who walks that task, side by side: algorithms of trained agents, as ppo; ``linear``, the linear law; ``fixed``, the paper's controller; ``you``,
+        the visitor.
     policy : path, optional
         A folder with a trained policy, which walks too. It says which task it is for.
     port : [0, 65535]
@@ -186,7 +187,9 @@ def _task_of(folder: Path) -> str:
 def _walkers(task: str, agents: Sequence[str]) -> dict[str, str]:
     """The page's settings for a task and who walks it."""
     version = TASK_VERSIONS[require_choice("task", task, TASK_VERSIONS)]
-    known = (*_WITHOUT_FILES, *agent_index()["agents"].get(f"{task}-v{version}", {}), _OWN)
+    index = agent_index()
+    known = [*_WITHOUT_FILES, *index["agents"].get(f"{task}-v{version}", {}), _OWN]
+    known += ["linear"] if task in index["laws"] else []
     for agent in agents:
         require_choice("agent", agent, known)
     return {"task": task, **({"walkers": ",".join(agents)} if agents else {})}

@@ -21,19 +21,23 @@ def trained_folder() -> Path | None:
 
 
 def agent_index() -> dict[str, Any]:
-    """What the page reads before it reads an agent: by task and algorithm the seeds, the observation's names and the mean scores; by task the reference."""
+    """What the page reads before it reads an agent.
+
+    ``agents``: by task (with its version) and algorithm, the seeds, the observation's names and the mean scores. ``laws``: by task, the matrix of the
+    linear law, row by row. ``references``: by task, the fixed controller's mean and the best that a search has found.
+    """
     folder = trained_folder()
     if folder is None:
-        return {"agents": {}, "references": {}}
+        return {"agents": {}, "laws": {}, "references": {}}
     agents = {
         task.name: {place.name: _described(place) for place in _folders(task)}
         for task in _folders(folder)
     }
-    file = folder.parent / "references.json"
-    found = read_json(file) if file.exists() else {}
+    laws, found = (_read(folder.parent / name) for name in ("settings.json", "references.json"))
+    linear = {task: values["weights"] for task, values in laws.get("linear", {}).items()}
     kept = ("metric", "fixed", "value")
     references = {task: {key: each[key] for key in kept} for task, each in found.items()}
-    return {"agents": agents, "references": references}
+    return {"agents": agents, "laws": linear, "references": references}
 
 
 def _described(place: Path) -> dict[str, Any]:
@@ -51,6 +55,10 @@ def _described(place: Path) -> dict[str, Any]:
         "observation": card["observation"]["names"],
         "means": {metric: fmean(each) for metric, each in scores.items()},
     }
+
+
+def _read(file: Path) -> Any:
+    return read_json(file) if file.exists() else {}
 
 
 def _folders(place: Path) -> list[Path]:

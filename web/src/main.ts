@@ -9,7 +9,7 @@ import { Stage, type View } from "./scene/stage";
 import { makeGif } from "./share/film";
 import { FrameTimes } from "./share/frame_times";
 import { readLink, writeLink, type Settings } from "./share/link";
-import { loadPolicy } from "./tasks/agents";
+import { agentIndex, LinearAgent, loadPolicy } from "./tasks/agents";
 import { TaskModule } from "./tasks/episode";
 import { units } from "./share/units";
 import { parseWalk, type SavedWalk } from "./share/files";
@@ -169,7 +169,7 @@ async function main(): Promise<void> {
   requestAnimationFrame(frame);
   document.documentElement.dataset.ready = "true";
   // For tests, and for whoever wants to look closer from the console
-  const tasks = { load: () => TaskModule.load(kernel), loadPolicy };
+  const tasks = { load: () => TaskModule.load(kernel), loadPolicy, agentIndex, LinearAgent };
   const look = { kernel, stage, tasks, exhibits, active: () => active, frames, units, makeGif, ready: performance.now() - began };
   Object.assign(window, { leanYaw: look });
 }

@@ -11,7 +11,7 @@ import { TaskMarks } from "../scene/task_marks";
 import { asTable } from "../share/files";
 import type { Settings } from "../share/link";
 import * as units from "../share/units";
-import { agentIndex, FIXED, loadPolicy, type Agent, type AgentEntry, type AgentIndex, type PolicyAgent } from "../tasks/agents";
+import { agentIndex, FIXED, LinearAgent, loadPolicy, type Agent, type AgentEntry, type AgentIndex, type PolicyAgent } from "../tasks/agents";
 import { TaskModule, TASKS, type Episode } from "../tasks/episode";
 import { Facts, h, section } from "../ui/dom";
 import { number } from "../ui/plot";
@@ -24,6 +24,9 @@ const COLOURS = ["#256eb2", ...TINTS.slice(1)];
 const YOU = "you";
 /** A policy served beside the page: `lean-yaw view --agent-path FOLDER`. */
 const OWN = "own";
+const LINEAR = "linear";
+/** Who walks beside the visitor at first, where there is such an agent. */
+const RIVAL = "ppo";
 const STRIDE_CHANGE = 0.25;
 /** Episodes of more time than this last until a fall. */
 const LONG = 1000;
@@ -118,9 +121,9 @@ export class TaskExhibit implements Exhibit {
   readonly subtitle = "Tasks of the suite: your score beside trained agents'";
   private task = "Heading";
   private seed = 1;
-  private chosen = [YOU];
+  private chosen = [YOU, RIVAL];
   private own: string | null = null;
-  private index: AgentIndex = { agents: {}, references: {} };
+  private index: AgentIndex = { agents: {}, laws: {}, references: {} };
   private module: TaskModule | null = null;
   private policies = new Map<string, PolicyAgent>();
   private runners: Runner[] = [];
@@ -189,13 +192,13 @@ export class TaskExhibit implements Exhibit {
 
   private open(task: string): void {
     this.task = task;
-    this.chosen = this.chosen.filter((name) => name !== OWN && this.offered().includes(name));
-    if (!this.chosen.length) this.chosen = [YOU];
+    this.chosen = this.chosen.filter((name) => name !== OWN);
     void this.restart();
   }
 
   private offered(): string[] {
-    return [YOU, "fixed", ...Object.keys(this.shipped()), ...(this.own ? [OWN] : [])];
+    const law = this.index.laws[this.task] ? [LINEAR] : [];
+    return [YOU, "fixed", ...law, ...Object.keys(this.shipped()), ...(this.own ? [OWN] : [])];
   }
 
   /** Trained agents that see what this task shows here. */
@@ -208,6 +211,7 @@ export class TaskExhibit implements Exhibit {
   private async agent(name: string): Promise<Agent> {
     if (name === YOU) return { act: () => this.action() };
     if (name === "fixed") return FIXED;
+    if (name === LINEAR) return new LinearAgent(this.index.laws[this.task]);
     const { id, observation } = TASKS[this.task];
     const place = name === OWN ? this.own! : `agents/${id}/${name}/seed${this.index.agents[id]?.[name]?.seeds[0] ?? 0}/policy`;
     if (!this.policies.has(place)) this.policies.set(place, await loadPolicy(place, observation));
@@ -224,6 +228,9 @@ export class TaskExhibit implements Exhibit {
   private async start(): Promise<void> {
     const turn = ++this.started;
     const { task } = this;
+    const offered = this.offered();
+    this.chosen = this.chosen.filter((name) => offered.includes(name) || name === OWN);
+    if (!this.chosen.length) this.chosen = [YOU];
     const key = BigInt.asUintN(64, BigInt(this.seed) * GOLDEN);
     let agents: [string, Agent][];
     try {
@@ -441,5 +448,5 @@ export class TaskExhibit implements Exhibit {
 }
 
 function called(name: string): string {
-  return { [YOU]: "You", fixed: "Fixed", [OWN]: "Your policy" }[name] ?? name.toUpperCase();
+  return { [YOU]: "You", fixed: "Fixed", [LINEAR]: "Linear law", [OWN]: "Your policy" }[name] ?? name.toUpperCase();
 }

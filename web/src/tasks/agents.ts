@@ -15,9 +15,11 @@ export interface AgentEntry {
   means: Record<string, number>;
 }
 
-/** The agents beside the page by task (with its version) and algorithm; of each task's headline the fixed controller's mean and the reference. */
+/** What is beside the page: agents by task (with its version) and algorithm; of each task's headline the fixed controller's mean and the reference. */
 export interface AgentIndex {
   agents: Record<string, Record<string, AgentEntry>>;
+  /** Linear laws: by task a matrix, row by row. */
+  laws: Record<string, number[]>;
   references: Record<string, { metric: string; fixed: number; value: number }>;
 }
 
@@ -49,6 +51,16 @@ function readSafetensors(file: ArrayBuffer): Map<string, Float32Array> {
     arrays.set(name, new Float32Array(file.slice(8 + size + data_offsets[0], 8 + size + data_offsets[1])));
   }
   return arrays;
+}
+
+/** A matrix times the observation and a constant, kept in bounds. */
+export class LinearAgent implements Agent {
+  constructor(private readonly matrix: number[]) {}
+
+  act(observation: ArrayLike<number>): number[] {
+    const seen = [...Array.from(observation), 1];
+    return [0, 1].map((row) => OUTPUTS.clip(seen.reduce((sum, value, column) => sum + this.matrix[row * seen.length + column] * value, 0)));
+  }
 }
 
 const sigmoid = (x: number) => 0.5 + 0.5 * Math.tanh(0.5 * x);
@@ -110,7 +122,7 @@ const beside = (name: string) => new URL(name, document.baseURI);
 
 /** The page's agents; none where their files are not beside the page, as in a notebook. */
 export async function agentIndex(): Promise<AgentIndex> {
-  const none = { agents: {}, references: {} };
+  const none = { agents: {}, laws: {}, references: {} };
   if (!/^https?:/.test(document.baseURI)) return none;
   const response = await fetch(beside("agents/index.json"));
   return response.ok ? ((await response.json()) as AgentIndex) : none;
