@@ -118,10 +118,12 @@ export class TaskExhibit implements Exhibit {
   readonly isPushed = false;
   readonly id = "tasks";
   readonly title = "Play";
-  readonly subtitle = "Tasks of the suite: your score beside trained agents'";
+  readonly subtitle = "The tasks of the suite, for you and for trained agents";
   private task = "Heading";
   private seed = 1;
   private chosen = [YOU, RIVAL];
+  /** Walkers that a link asks for. */
+  private asked: string[] = [];
   private own: string | null = null;
   private index: AgentIndex = { agents: {}, laws: {}, references: {} };
   private module: TaskModule | null = null;
@@ -154,7 +156,7 @@ export class TaskExhibit implements Exhibit {
     this.isHere = true;
     if (settings.task in TASKS) this.task = settings.task;
     if (Number.isInteger(Number(settings.seed))) this.seed = Number(settings.seed ?? this.seed);
-    if (settings.walkers) this.chosen = settings.walkers.split(",").slice(0, MOST_WALKERS);
+    if (settings.walkers) this.asked = this.chosen = settings.walkers.split(",").slice(0, MOST_WALKERS);
     if (settings.policy) this.own = settings.policy;
     if (!this.panels.length) this.panels = this.build();
     this.app.panel.replaceChildren(...this.panels);
@@ -247,7 +249,10 @@ export class TaskExhibit implements Exhibit {
     for (const [k, [name, agent]] of agents.entries()) {
       this.runners.push(new Runner(this.app, name, this.module.episode(task, key), agent, TINTS[k], () => this.ended()));
     }
+    const missing = this.asked.filter((name) => !offered.includes(name));
+    this.asked = [];
     this.app.notice(null);
+    if (missing.length) this.complain(new Error(`There is no agent ${missing.join(", ")} for what ${task} shows.`));
     this.showTask();
     this.place(0, true);
     this.show();
@@ -290,7 +295,9 @@ export class TaskExhibit implements Exhibit {
     const { radius } = leader.episode.task;
     if (shown.laterGate) this.marks.setGates([shown.goal, shown.laterGate], radius);
     else this.marks.setGoal(shown.goal, radius);
-    this.marks.setHeading(shown.heading, [centre[0], this.aside]);
+    const { goal } = shown;
+    const toGoal = goal && Math.atan2(this.aside - goal[1], goal[0] - centre[0]);
+    this.marks.setHeading(shown.heading ?? toGoal, [centre[0], this.aside]);
     const { path } = leader.episode;
     if (path && !(Math.abs(centre[0] - this.pathFrom) < 0.5 * PATH_BEHIND)) {
       this.pathFrom = centre[0];
