@@ -240,7 +240,7 @@ def test_arrow_keys_steer_in_a_task_and_another_episode_is_another(page):
 def test_a_policy_of_ones_own_walks_its_task(page, tmp_path):
     agents.save(agents.load("LeanYaw/Slalom-v1", algorithm="apg"), tmp_path)
     with PageServer(policy=tmp_path, agents=["apg"]) as server:
-        own = page.context.new_page()
+        own = page.context.browser.new_page()
         own.set_default_timeout(PATIENCE)
         own.goto(f"{server.address}&quality=4")
         own.wait_for_selector("#scores tbody tr")
