@@ -282,11 +282,11 @@ def _standings(rows: Sequence[Row]) -> list[str]:
     lines: list[list[str]] = []
     for task in dict.fromkeys(row.task for row in rows if task_named(row.task).is_ranked):
         headline = task_named(task).headline
-        # an agent that is shown what others must find out competes with nobody
         found = [
-            row for row in rows
-            if (row.task, row.metric) == (task, headline) and not (row.agent in AGENTS and AGENTS[row.agent].options)
-        ]  # fmt: skip
+            row
+            for row in rows
+            if (row.task, row.metric) == (task, headline) and _sees_what_all_see(row.agent)
+        ]
         best = max(found, key=lambda row: direction(task, headline) * row.score)
         line = [best.agent, bracketed(mean(best))]
         if (reference := references().get(task)) is None:
@@ -298,9 +298,15 @@ def _standings(rows: Sequence[Row]) -> list[str]:
         lines.append([task, words(headline), *marks, *line, f"{share:.2f}", room])
     return [
         f"A task has room to win if its best agent lies between {LEAST} and {MOST} of the way from the fixed controller to the reference. References are found "
-        "on validation episodes ([controllers](controllers.md)).",
+        "on validation episodes ([controllers](controllers.md)). Agents that know more than the observation are left out: mpc plans on copies of the true "
+        "walker, and the oracle is shown the body.",
         markdown_table(titles, lines),
     ]
+
+
+def _sees_what_all_see(agent: str) -> bool:
+    """Whether an agent has nothing but the task's own observation."""
+    return kind_of(agent) != "planner" and not (agent in AGENTS and AGENTS[agent].options)
 
 
 def _comparisons(claims: Sequence[Claim]) -> list[str]:
