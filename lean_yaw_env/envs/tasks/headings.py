@@ -306,6 +306,7 @@ LEVEL = replace(
     max_offset_change=0.1,
     pumping=PUMPING,
     push_level=LEVEL_PUSHES,
+    history=(*HEADING.history[:-1], f"{HEADING.history[-1][:-1]}; pushes at level {LEVEL_PUSHES}."),
 )
 
 UPHILL = -0.01
