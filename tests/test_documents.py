@@ -214,6 +214,14 @@ def _readme_results() -> list[tuple[str, str, str]]:
     return cells
 
 
+def test_extras_that_pages_name_exist() -> None:
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    known = set(re.findall(r"^(\w+) = \[", project, re.MULTILINE))
+    for page in PAGES:
+        for names in re.findall(r"'\.\[([\w,]+)\]'", page.read_text(encoding="utf-8")):
+            assert set(names.split(",")) <= known
+
+
 def test_the_readme_lists_every_task() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     listed = re.findall(r"^\| `(LeanYaw/\S+)` \|", text, re.MULTILINE)
