@@ -82,6 +82,8 @@ def test_environments_take_the_ids_that_gymnasium_takes(kind) -> None:
 def test_a_misspelt_option_names_its_neighbour() -> None:
     with pytest.raises(TypeError, match="unexpected keyword argument 'slop'; did you mean 'slope'"):
         gym.make("LeanYaw/Heading-v1", slop=0.01)
+    with pytest.raises(TypeError, match="argument 'step_inf'; did you mean 'step_info'"):
+        gym.make_vec("LeanYaw/Heading-v1", num_envs=2, step_inf=False)
 
 
 def test_a_spec_survives_json_with_the_walker_s_parameters() -> None:

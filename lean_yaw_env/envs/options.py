@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any, TypeVar
@@ -127,12 +127,17 @@ class EnvOptions:
             require_choice("random_body", self.random_body, BODY_DRAWS)
 
     @classmethod
-    def of(cls, arguments: Mapping[str, Any]) -> EnvOptions:
-        """Options from an environment's keyword arguments, or ``TypeError`` naming one that there is not, and the nearest that there is."""
+    def of(cls, arguments: Mapping[str, Any], others: Sequence[str]) -> EnvOptions:
+        """Options from an environment's keyword arguments, or ``TypeError`` naming one that there is not, and the nearest that there is.
+
+        ``others`` are the environment's arguments that are no options; a misspelt one is among ``arguments``.
+        """
         known = [field.name for field in fields(cls)]
         for name in require_mapping("arguments", arguments):
             if name not in known:
-                raise TypeError(f"unexpected keyword argument {name!r}{suggestion(name, known)}")
+                raise TypeError(
+                    f"unexpected keyword argument {name!r}{suggestion(name, [*known, *others])}"
+                )
         return cls(**arguments)
 
     def for_task(self, task: Task) -> TaskOptions:

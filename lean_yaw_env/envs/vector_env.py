@@ -32,6 +32,9 @@ from lean_yaw_env.validation import (
 )
 
 _RENDER_MODES = ("rgb_array",)
+_OTHER_ARGUMENTS = (
+    "num_envs", "task", "autoreset_mode", "copy", "step_info", "threads", "max_episode_steps", "render_mode",
+)  # fmt: skip
 Observations = NDArray[np.float32]
 
 
@@ -103,7 +106,7 @@ class WalkerVectorEnv(PickledWithState, VectorEnv[Observations, NDArray[np.float
         self.render_mode = render_mode
         self.copy = require_flag("copy", copy)
         self.step_info = require_flag("step_info", step_info)
-        self.options = EnvOptions.of(options)
+        self.options = EnvOptions.of(options, _OTHER_ARGUMENTS)
         self.task = task_named(task)
         self.simulation = Simulation(
             self.task, self.options, self.num_envs, max_episode_steps=max_episode_steps

@@ -91,7 +91,7 @@ class WalkerEnv(PickledWithState, gym.Env[NDArray[np.float32], NDArray[np.float3
         self.render_mode = render_mode
         if render_mode in ("rgb_array_list", "human"):
             self.metadata = {**self.metadata, "render_fps": FRAMES_PER_SECOND}
-        self.options = EnvOptions.of(options)
+        self.options = EnvOptions.of(options, ("task", "render_mode"))
         self.task = task_named(task)
         self.simulation = Simulation(self.task, self.options, 1)
         self.observation_space = self.options.observation_space(self.task)
