@@ -245,6 +245,7 @@ def test_a_policy_of_ones_own_walks_its_task(page, tmp_path):
         own = page.context.browser.new_page()
         own.set_default_timeout(PATIENCE)
         own.goto(f"{server.address}&quality=4")
+        own.wait_for_selector("html[data-ready=true]")
         own.wait_for_selector("#scores tbody tr")
         own.keyboard.press("p")
         steps(own, 10)
