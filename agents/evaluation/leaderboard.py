@@ -15,6 +15,7 @@ from tqdm import tqdm
 
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.files import write_text
+from lean_yaw_env.tables import csv_table, markdown_table
 from lean_yaw_env.validation import require_count
 
 from ..agent import Agent
@@ -39,9 +40,7 @@ from .robustness import collapses
 from .row_tables import (
     IMAGES,
     bracketed,
-    csv_table,
     iqm,
-    markdown_table,
     mean,
     number,
     rows_to_csv,
