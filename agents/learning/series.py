@@ -117,8 +117,7 @@ def make_series(trainings: Sequence[Training], folder: Path) -> None:
         make_run(training, folder / f"seed{training.seed}")
     first, seeds = trainings[0], [training.seed for training in trainings]
     write_json(
-        folder / SERIES_FILE,
-        {"env_id": first.env_id, "algorithm": first.algorithm, "seeds": seeds},
+        folder / SERIES_FILE, {"env_id": first.env_id, "algorithm": first.algorithm, "seeds": seeds}
     )
 
 

@@ -18,14 +18,7 @@ from lean_yaw_env.analysis import Branch, continue_gait, stability_map
 from lean_yaw_env.engine import Engine
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.paper.checks import Check, Result, assess, compare, printed
-from lean_yaw_env.paper.drawing import (
-    MULTIPLIER,
-    STABLE_FACE,
-    TILT,
-    TOP,
-    name_axes,
-    picture_of,
-)
+from lean_yaw_env.paper.drawing import MULTIPLIER, STABLE_FACE, TILT, TOP, name_axes, picture_of
 from lean_yaw_env.paper.walkers import (
     flat_active_walker,
     flat_passive_walker,
