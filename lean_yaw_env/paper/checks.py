@@ -77,8 +77,10 @@ def _rows() -> dict[str, Printed]:
     found: dict[str, Printed] = {}
     for table in ("printed.csv", "classics.csv"):
         for row in read_csv(Path(__file__).with_name(table)):
-            row["is_open"], tolerance = bool(row.pop("open")), row.pop("tolerance")
-            found[row["name"]] = Printed(**row, tolerance=float(tolerance) if tolerance else None)
+            is_open, tolerance = bool(row.pop("open")), row.pop("tolerance")
+            found[row["name"]] = Printed(
+                **row, is_open=is_open, tolerance=float(tolerance) if tolerance else None
+            )
     return found
 
 
