@@ -21,7 +21,7 @@ from typer import Argument, Option
 from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.files import require_writable
 from lean_yaw_env.registration import TASK_VERSIONS
-from lean_yaw_env.reporting import keep, reported, uninterrupted
+from lean_yaw_env.reporting import keep, reporting, uninterrupted
 
 ALL = "all"
 CACHE = "evaluations"
@@ -48,7 +48,7 @@ AsJson = Annotated[bool, Option("--json", help="Print JSON instead of tables.")]
 
 def _command(name: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """A decorator that makes a function a command of the app, which reports its errors and what installs a library that it lacks."""
-    return lambda function: app.command(name)(reported(name)(needs_extra("train")(function)))
+    return lambda function: app.command(name)(reporting(name)(needs_extra("train")(function)))
 
 
 @app.callback()

@@ -10,10 +10,9 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from functools import wraps
+from collections.abc import Iterator
 from types import FrameType
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn
 
 from lean_yaw_env.errors import LeanYawError
 
@@ -23,8 +22,6 @@ NOTHING = "nothing is kept"
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _PATIENCE = 0.8  # seconds from a signal to the end of child processes that do not end by themselves
 _LAST = 0.4  # seconds from there to the end of this process
-
-Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 class _State:
@@ -38,20 +35,6 @@ class _State:
 def keep(words: str) -> None:
     """Set what the running command says if it is interrupted: what is kept, and how to continue."""
     _State.kept = words
-
-
-def reported(program: str) -> Callable[[Function], Function]:
-    """A decorator that runs a function within ``reporting``."""
-
-    def decorate(function: Function) -> Function:
-        @wraps(function)
-        def command(*arguments: Any, **options: Any) -> Any:
-            with reporting(program):
-                return function(*arguments, **options)
-
-        return command  # type: ignore[return-value]
-
-    return decorate
 
 
 @contextlib.contextmanager
