@@ -46,12 +46,9 @@ def killed(kind: str, folder: Path) -> int:
 
 @pytest.fixture
 def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
-    kind = request.node.callspec.params["kind"]
-    if kind in work.NEEDS:
-        pytest.importorskip(work.NEEDS[kind])
     for name in ("warm", "whole", "killed"):
         (tmp_path / name).mkdir()
-        work.begin(kind, tmp_path / name)
+        work.begin(request.node.callspec.params["kind"], tmp_path / name)
     return tmp_path
 
 

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from agents.datasets import make_dataset
 from agents.evaluation.plan import Evaluation
 from agents.learning.ppo import PPOSettings
 from agents.learning.runs import Training, make_run, run
 from agents.learning.sac import SACSettings
 from agents.learning.series import new_series, run_series
-from agents.shipping import retrain
-from agents.tuning import linear
 from agents.tuning.study import Tuning, tune
 from lean_yaw_env import Walker
-from lean_yaw_env.analysis import basin, basin_sizes, filling, stability_map
+from lean_yaw_env.analysis import basin, filling, stability_map
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.paper import reproduce, write_report
 
@@ -49,16 +45,8 @@ def go_on(kind: str, folder: Path) -> None:
         run(folder / "run", progress=False)
     elif kind == "series":
         run_series(folder / "series", progress=False)
-    elif kind == "retrain":
-        choices = {"steps": 4096, "episodes": 2, "checkpoint_seconds": 0.0}
-        list(retrain(["Walk"], ["ppo"], folder / "out", choices=choices, progress=False))
     elif kind == "evaluate":
         _evaluation(folder)
-    elif kind == "dataset":
-        make_dataset("Heading", "medium", folder, episodes=20, progress=False)
-    elif kind == "linear":
-        linear._LONGEST, linear.EPISODES, linear._VALIDATION_EPISODES = 20.0, 4, 16
-        linear.tune_linear("Heading", 10, folder / "law.json", shown=lambda line: None)
     elif kind == "tune":
         tuning = Tuning("feedback", "Heading", episodes=4, horizon=20.0)
         tune(tuning, 6, folder / "study.db", out=folder / "best.json", shown=lambda line: None)
@@ -80,10 +68,6 @@ def _analysis(kind: str, folder: Path) -> Any:
     if kind == "map":
         axes = {"hip_width": np.linspace(0.1, 0.5, 70), "slope": np.linspace(0.005, 0.05, 70)}
         return stability_map(Walker(), axes, path=folder / "map.nc")
-    if kind == "atlas":
-        axes = {"hip_width": np.linspace(0.1, 0.5, 60), "slope": np.linspace(0.005, 0.05, 60)}
-        gaits = stability_map(Walker(), axes, path=folder / "gaits.zarr")
-        return gaits.merge(basin_sizes(gaits, every=4, n_steps=10, path=folder / "basins.zarr"), join="outer")  # fmt: skip
     first, second = (
         ("ankle_angle", np.linspace(-0.1, 0.1, 60)),
         ("heading", np.linspace(-0.5, 0.5, 60)),
@@ -100,19 +84,12 @@ def result(kind: str, folder: Path) -> str:
                 digest.update(run_.survived.tobytes())
                 for name in sorted(run_.metrics):
                     digest.update(run_.metrics[name].tobytes())
-    elif kind == "dataset":
-        import minari
-
-        os.environ["MINARI_DATASETS_PATH"] = str(folder)
-        for episode in minari.load_dataset("leanyaw/heading/medium-v1").iterate_episodes():
-            for rows in (episode.observations, episode.actions, episode.rewards):
-                digest.update(rows.tobytes())
-    elif kind in ("map", "basin", "atlas"):
+    elif kind in ("map", "basin"):
         data = _analysis(kind, folder)
         for name in sorted(data):
             digest.update(data[name].to_numpy().tobytes())
     else:
-        names = ("*.csv", "*.safetensors", "evaluation.json", "report.md", "law*.json")
+        names = ("*.csv", "*.safetensors", "evaluation.json", "report.md")
         for file in sorted(file for name in names for file in folder.rglob(name)):
             if file.name != "checkpoint.safetensors":  # which holds the seconds
                 digest.update(file.name.encode() + file.read_bytes())
@@ -124,9 +101,6 @@ def leftovers(folder: Path) -> list[Path]:
     return [*folder.rglob(".partial-*"), *folder.rglob(".lock")]
 
 
-KINDS: tuple[str, ...] = (
-    *SETTINGS, "series", "retrain", "evaluate", "tune", "linear", "dataset", "reproduce", "map", "basin", "atlas",
-)  # fmt: skip
-NEEDS = {"dataset": "minari", "atlas": "zarr"}
+KINDS: tuple[str, ...] = (*SETTINGS, "series", "evaluate", "tune", "reproduce", "map", "basin")
 COMPARED = tuple(kind for kind in KINDS if kind != "tune")
 """Kinds with the same result however often they are interrupted; what a study tries next depends on the trials there are."""
