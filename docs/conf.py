@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 from sphinx.application import Sphinx
@@ -15,6 +16,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
 import from_code
 
 import lean_yaw_env
+from lean_yaw_env.viewer import write_page
 
 project = "lean_yaw_env"
 author = copyright = "The lean_yaw_env developers"
@@ -46,10 +48,15 @@ autodoc_typehints_format = "short"
 autodoc_type_aliases = {name: name for name in ("ArrayLike", "Vector", "Foot", "NDArray")}
 napoleon_numpy_docstring, napoleon_google_docstring = True, False
 
+# Formulas without a network: of the package with MathJax only what draws them is copied
+MATHJAX = Path(find_spec("sphinx-mathjax-offline").origin).parent / "static" / "mathjax"
+mathjax_path = "mathjax/tex-chtml.js"
+
 html_theme = "furo"
 html_title = "lean_yaw_env"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
+html_favicon = "static/walker.svg"
 html_theme_options = {
     "light_css_variables": {"color-brand-primary": "#256eb2", "color-brand-content": "#256eb2"},
     "dark_css_variables": {"color-brand-primary": "#7db4e6", "color-brand-content": "#7db4e6"},
@@ -82,15 +89,22 @@ def _plain(
     lines[:] = from_code.without_markdown(lines)
 
 
-def _copy_page(app: Sphinx, error: Exception | None) -> None:
+def _copy(app: Sphinx, error: Exception | None) -> None:
+    """Put the live page and MathJax beside the site."""
     if error is None and app.builder.name == "html":
-        page = ROOT / "lean_yaw_env" / "viewer" / "page"
-        shutil.copytree(page, Path(app.outdir) / "live", dirs_exist_ok=True)
+        write_page(Path(app.outdir) / "live")
+        out = Path(app.outdir)
+        shutil.copytree(
+            MATHJAX / "output" / "chtml" / "fonts" / "woff-v2",
+            out / "_static" / "mathjax" / "output" / "chtml" / "fonts" / "woff-v2",
+            dirs_exist_ok=True,
+        )
+        shutil.copy(MATHJAX / "tex-chtml.js", out / "_static" / mathjax_path)
 
 
 def setup(app: Sphinx) -> None:
-    """Fill marked places from the code, and put the live page beside the site."""
+    """Fill marked places from the code, and complete the built site."""
     app.connect("source-read", _fill)
     app.connect("autodoc-skip-member", _skip_fields)
     app.connect("autodoc-process-docstring", _plain, priority=400)
-    app.connect("build-finished", _copy_page)
+    app.connect("build-finished", _copy)

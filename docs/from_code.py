@@ -141,7 +141,7 @@ def gallery(results: str) -> str:
             *scores,
         ]
         film = f'<video src="films/{name.lower()}.mp4" controls loop muted playsinline preload="metadata"></video>'
-        code = f'env = gymnasium.make("lean_yaw_env:{env_id}")'
+        code = f'import gymnasium as gym\n\nenv = gym.make("lean_yaw_env:{env_id}")'
         parts = [
             f"## {name}",
             task.summary,

@@ -72,7 +72,13 @@ COMMANDS: dict[tuple[str, str], tuple[list[str], dict[str, tuple[str, ...]]]] = 
         },
     ),
     ("lean-yaw", "play"): (["LeanYaw/Level-v1"], {"ENV_ID": ("no-such-name", "LeanYaw/Heading-v7"), "--speed": POSITIVE, "--seed": SEEDS}),
-    ("lean-yaw", "view"): ([], {"--walk": ("no-such-file.json",), "--port": (*SEEDS, "99999")}),
+    ("lean-yaw", "view"): (
+        ["--task", "Slalom"],
+        {
+            "--walk": ("no-such-file.json",), "--task": TEXT, "--agent": TEXT, "--agent-path": ("no-such-folder",),
+            "--port": (*SEEDS, "99999"),
+        },
+    ),
     ("lean-yaw", "reproduce"): (["table1"], {"NAMES": TEXT, "--out": ()}),
     ("lean-yaw", "findings"): ([], {"--out": ()}),
     ("agents", "train"): (SMALL, TRAIN),

@@ -14,6 +14,7 @@ import pytest
 
 import agents
 import lean_yaw_env
+from lean_yaw_env.registration import ALL_ENV_IDS
 
 ROOT = Path(__file__).parents[1]
 DOCS, BUILD = ROOT / "docs", ROOT / "docs" / "build"
@@ -50,6 +51,15 @@ def test_each_public_name_has_a_docstring(package: str) -> None:
     text = filled(f"<!-- from code: reference {package} -->")
     rows = re.findall(r"^   \* - :py:obj:`(\w+) <.*>`\n     - (.*)$", text, re.MULTILINE)
     assert rows and all(summary.strip() for _, summary in rows)
+
+
+def test_the_code_of_the_gallery_makes_every_environment() -> None:
+    text = filled("<!-- from code: gallery docs/leaderboard.csv -->")
+    made = {}
+    for block in re.findall(r"^```python\n(.*?)^```$", text, re.DOTALL | re.MULTILINE):
+        exec(block, names := {})
+        made[names["env"].spec.id] = names["env"].close()
+    assert tuple(made) == ALL_ENV_IDS
 
 
 def test_every_page_is_in_the_contents() -> None:

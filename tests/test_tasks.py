@@ -567,7 +567,7 @@ def test_harder_pushes_end_walks_sooner() -> None:
 
 @pytest.mark.parametrize("task", ["Level", "LevelUphill"])
 def test_level_starts_in_the_gait_of_pumping(task: str) -> None:
-    env = WalkerEnv(task, start_disturbance=0.0)
+    env = WalkerEnv(task, start_disturbance=0.0, push_level=0.0)
     first, _ = env.reset(seed=0)
     for _ in range(6):
         observation, _, _, _, info = env.step(np.array([0.0, 0.6], dtype=np.float32))
@@ -589,7 +589,7 @@ def test_level_is_walked_and_steered_by_pumping_alone(task: str) -> None:
     n = 32
     errors = []
     for steering in (0.0, 0.2):
-        envs = started(task, n)
+        envs = started(task, n, push_level=0.0)
         for _ in range(180):  # of 0.5 to 1 units of time, within the horizon
             _, _, terminated, truncated, info = envs.step(
                 pumping(envs.simulation.observations, steering)
@@ -602,7 +602,7 @@ def test_level_is_walked_and_steered_by_pumping_alone(task: str) -> None:
 
 
 def test_level_without_pumping_falls_and_pumping_costs_what_the_gait_takes() -> None:
-    env = WalkerEnv("Level", start_disturbance=0.0)
+    env = WalkerEnv("Level", start_disturbance=0.0, push_level=0.0)
     env.reset(seed=0)
     for _ in range(50):
         *_, info = env.step(np.array([0.0, 0.6], dtype=np.float32))

@@ -13,10 +13,14 @@ import urllib.request
 import numpy as np
 import pytest
 
+import agents
+from agents import AGENTS, shipped_seeds
+from agents.policies.policy_files import shipped_folder
 from lean_yaw_env import Walker, WalkerParameters, find_limit_cycle
 from lean_yaw_env.analysis import find_passive_gaits
 from lean_yaw_env.passive import PassiveWalker
-from lean_yaw_env.viewer import PAGE, PageServer
+from lean_yaw_env.registration import ENV_IDS
+from lean_yaw_env.viewer import PAGE, PageServer, write_page
 
 
 def answer(address, **headers):
@@ -65,6 +69,84 @@ def test_server_gives_the_walk_that_it_was_given(tmp_path):
 def test_missing_walk_is_refused(tmp_path):
     with pytest.raises(FileNotFoundError, match="no walk at"):
         PageServer(tmp_path / "none.json")
+
+
+def test_server_gives_every_trained_agent_that_is_installed_and_an_index_of_them():
+    with PageServer() as server:
+        index = json.loads(answer(server.address + "agents/index.json")[1])
+        for env_id in ENV_IDS:
+            task = env_id.split("/")[1]
+            offered = index["agents"].get(task, {})
+            for algorithm, entry in offered.items():
+                assert entry["seeds"] == shipped_seeds(env_id, algorithm)
+                policy = agents.load(env_id, algorithm=algorithm, seed=entry["seeds"][0])
+                assert entry["observation"] == list(policy.card.layout.names)
+                assert np.isfinite(list(entry["means"].values())).all()
+            assert set(offered) == {name for name in AGENTS if shipped_seeds(env_id, name)}
+        file = shipped_folder("LeanYaw/Slalom-v1", "ppo", 0) / "policy.safetensors"
+        place = "agents/Slalom-v1/ppo/seed0/policy.safetensors"
+        assert answer(server.address + place) == (200, file.read_bytes())
+        assert answer(server.address + "agents/../references.json")[0] == 404
+        assert answer(server.address + "agents/Slalom-v1/")[0] == 404
+
+
+def test_server_opens_a_task_with_the_agents_asked_for():
+    with PageServer(task="Slalom", agents=["ppo", "you"]) as server:
+        assert server.address.split("#")[1] == "tab=tasks&task=Slalom&walkers=ppo,you"
+    with PageServer(task="Walk") as server:
+        assert server.address.split("#")[1] == "tab=tasks&task=Walk"
+
+
+def test_server_gives_a_policy_of_ones_own_and_nothing_else_of_its_folder(tmp_path):
+    agents.save(agents.load("LeanYaw/Slalom-v1"), tmp_path)
+    (tmp_path / "secret.txt").write_text("x")
+    with PageServer(policy=tmp_path, agents=["fixed"]) as server:
+        base, opened = server.address.split("#")
+        assert opened == "tab=tasks&task=Slalom&walkers=fixed,own&policy=own/policy"
+        for name in ("policy.json", "policy.safetensors"):
+            assert answer(f"{base}own/{name}") == (200, (tmp_path / name).read_bytes())
+        assert answer(f"{base}own/secret.txt")[0] == 404
+
+
+def test_what_the_page_cannot_show_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="task must be one of"):
+        PageServer(task="Slalon")
+    with pytest.raises(ValueError, match="agent must be one of"):
+        PageServer(task="Slalom", agents=["her"])
+    with pytest.raises(ValueError, match="give task too"):
+        PageServer(agents=["ppo"])
+    with pytest.raises(FileNotFoundError, match=r"no policy\.json in"):
+        PageServer(policy=tmp_path)
+    agents.save(agents.load("LeanYaw/WaypointGoal-v1"), tmp_path)
+    with pytest.raises(ValueError, match="is for LeanYaw/WaypointGoal-v1"):
+        PageServer(policy=tmp_path)
+    with pytest.raises(ValueError, match="give one of them"):
+        PageServer(tmp_path / "walk.json", task="Slalom")
+
+
+def test_page_written_for_a_static_host_has_its_agents_beside_it(tmp_path):
+    write_page(tmp_path)
+    for file in PAGE.rglob("*"):
+        assert (
+            file.is_dir() or (tmp_path / file.relative_to(PAGE)).read_bytes() == file.read_bytes()
+        )
+    index = json.loads((tmp_path / "agents" / "index.json").read_text())
+    for task, offered in index["agents"].items():
+        for algorithm, entry in offered.items():
+            for seed in entry["seeds"]:
+                assert (
+                    tmp_path / "agents" / task / algorithm / f"seed{seed}" / "policy.json"
+                ).exists()
+
+
+def test_page_loads_in_less_than_a_megabyte():
+    """Compressed, as hosts send it, and without agents, which are read when they are asked for."""
+    sizes = {
+        file.name: len(gzip.compress(file.read_bytes()))
+        for file in PAGE.rglob("*")
+        if file.is_file()
+    }
+    assert sum(sizes.values()) < 1_000_000, sizes
 
 
 def test_saved_walk_holds_every_number_exactly(tmp_path):

@@ -1,15 +1,17 @@
-"""Compile the kernel to a WebAssembly module, from Numba's own intermediate code, and write down names and numbers for the page.
+"""Compile the kernel and the tasks to WebAssembly modules, from Numba's own intermediate code, and write down names and numbers for the page.
 
-``python web/build_kernel.py`` needs the extra ``web`` (llvmlite's wasm32 target comes with Numba, the linker with ``ziglang``) and writes
-``src/kernel/kernel.wasm``, ``src/kernel/layout.ts`` and ``src/physics/vehicle_data.ts``. All are kept in the repository. The module
-carries a digest of the sources it was compiled from, so that a test can tell a stale one.
+``python web/build_kernel.py`` needs the extra ``web`` (llvmlite's wasm32 target comes with Numba, the linker with ``ziglang``) and writes, in
+``src``, ``kernel/kernel.wasm`` and ``kernel/layout.ts``, ``tasks/tasks.wasm`` and ``tasks/tasks.json``, and ``physics/vehicle_data.ts``. All are
+kept in the repository. A module carries a digest of the sources it was compiled from: one that is not stale is not compiled again.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import base64
 import hashlib
+import importlib
 import json
 import os
 import re
@@ -18,12 +20,12 @@ import sys
 import tempfile
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 WEB = Path(__file__).parent
-KERNEL = WEB.parent / "lean_yaw_env" / "kernel"
 MODULE = WEB / "src" / "kernel" / "kernel.wasm"
 LAYOUT = WEB / "src" / "kernel" / "layout.ts"
+TASKS = WEB / "src" / "tasks" / "tasks.json"
 VEHICLES = WEB / "src" / "physics" / "vehicle_data.ts"
 _SECTION, _DIGEST_SIZE = "sources", 64  # the custom section with the digest
 
@@ -41,35 +43,62 @@ _LLVM_TYPES = {
     "int32": "i32",
     "int64": "i64",
     "float64*": "ptr",
+    "void*": "ptr",
 }
 
 
-def sources() -> list[Path]:
-    """The files that the module is compiled from: the page's, and the kernel's that they import, directly or not."""
+class Part(NamedTuple):
+    """A module of the page: the file with its entries, the packages whose files count as its sources, and the linker's options."""
+
+    path: Path
+    entries: str
+    packages: tuple[str, ...]
+    link: tuple[str, ...]
+
+
+KERNEL = Part(
+    MODULE,
+    "kernel_entries",
+    ("lean_yaw_env.kernel",),
+    ("-target", "wasm32-freestanding", "-fno-entry"),
+)
+# Sines and logarithms of the tasks are the C library's
+TASKS_PART = Part(
+    WEB / "src" / "tasks" / "tasks.wasm",
+    "task_entries",
+    ("lean_yaw_env.kernel", "lean_yaw_env.envs"),
+    ("-target", "wasm32-wasi", "-lc", "-mexec-model=reactor"),
+)
+
+
+def sources(part: Part = KERNEL) -> list[Path]:
+    """The files that a module is compiled from: the page's, and those of its packages that they import, directly or not."""
     found = {WEB / "runtime.c"}
-    waiting = [WEB / "kernel_entries.py"]
+    waiting = [WEB / f"{part.entries}.py"]
     while waiting:
         path = waiting.pop()
         if path in found:
             continue
         found.add(path)
         for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(
-                "lean_yaw_env.kernel"
-            ):
-                home = KERNEL.joinpath(*(node.module or "").split(".")[2:])
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(part.packages):
+                home = WEB.parent.joinpath(*(node.module or "").split("."))
                 names = [home / alias.name for alias in node.names] + [home]
-                waiting += [
-                    name.with_suffix(".py") for name in names if name.with_suffix(".py").exists()
-                ]
+                files = [name.with_suffix(".py") for name in names]
+                files += [home / "__init__.py"] if "TASKS" in {a.name for a in node.names} else []
+                waiting += [file for file in files if file.exists()]
     return sorted(found)
 
 
-def digest_of_sources() -> str:
+def digest_of_sources(part: Part = KERNEL) -> str:
     digest = hashlib.sha256()
-    for path in sources():
+    for path in sources(part):
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
+
+
+def is_stale(part: Part) -> bool:
+    return not part.path.exists() or digest_in(part.path.read_bytes()) != digest_of_sources(part)
 
 
 def digest_in(module: bytes) -> str:
@@ -167,14 +196,14 @@ def _object(exported: dict[Any, Any], apart: dict[Any, Any]) -> bytes:
     return machine.emit_object(module)
 
 
-def _linked(code: bytes, exported: list[str]) -> bytes:
+def _linked(code: bytes, exported: list[str], options: tuple[str, ...]) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         (place / "kernel.o").write_bytes(code)
         subprocess.run(
             [
                 sys.executable, "-m", "ziglang", "build-exe", "kernel.o", str(WEB / "runtime.c"),
-                "-target", "wasm32-freestanding", "-O", "ReleaseFast", "-fno-entry", "-fstrip", "-fcompiler-rt",
+                *options, "-O", "ReleaseFast", "-fstrip", "-fcompiler-rt",
                 "--stack", "65536", *(f"--export={name}" for name in exported), "--name", "linked",
             ],
             cwd=place,
@@ -183,14 +212,13 @@ def _linked(code: bytes, exported: list[str]) -> bytes:
         return (place / "linked.wasm").read_bytes()
 
 
-def build() -> bytes:
-    """Compile the module."""
-    os.environ.update(_NUMBA)
-    from kernel_entries import APART, ENTRIES
-
+def build(part: Part) -> bytes:
+    """Compile a module."""
+    named = importlib.import_module(part.entries)
     shared = ["shared_rows", "shared_size", "fused_multiply_add"]
-    exported = [function.__name__ for function in ENTRIES] + shared
-    return _with_digest(_linked(_object(ENTRIES, APART), exported), digest_of_sources())
+    exported = [function.__name__ for function in named.ENTRIES] + shared
+    code = _object(named.ENTRIES, getattr(named, "APART", {}))
+    return _with_digest(_linked(code, exported, part.link), digest_of_sources(part))
 
 
 def layout() -> str:
@@ -242,18 +270,69 @@ def vehicles() -> str:
     ])  # fmt: skip
 
 
+def tasks() -> dict[str, Any]:
+    """What the page must know of the tasks: records, settings, and what to show."""
+    import numpy as np
+    from task_entries import TASKS as offered
+
+    from lean_yaw_env.envs.options import EnvOptions, settings_of
+    from lean_yaw_env.envs.state import WALKER
+    from lean_yaw_env.registration import TASK_VERSIONS
+
+    def fields(record: np.dtype) -> dict[str, Any]:
+        """Place of each field in words of eight bytes; -1 less the place of a count."""
+        places = record.fields or {}
+        return {
+            name: -1 - place // 8 if kind.base.kind in "iu" else place // 8
+            for name, (kind, place, *_) in places.items()
+        }
+
+    def as_text(record: np.ndarray) -> str:
+        return base64.b64encode(record.tobytes()).decode()
+
+    described: dict[str, Any] = {}
+    for task in offered:
+        options = EnvOptions()
+        own = options.for_task(task)
+        settings = settings_of(options, task)
+        described[task.name] = {
+            "id": f"{task.name}-v{TASK_VERSIONS[task.name]}",
+            "summary": task.summary,
+            "reward": task.reward_text,
+            "fields": fields(task.record),
+            "initial": as_text(task.initial),
+            "settings": as_text(settings),
+            "body": as_text(np.array(own.parameters.body())),
+            "horizon": own.horizon,
+            "observation": list(options.observation_names(task)),
+            "metrics": {key: list(metric[:3]) for key, metric in task.metrics.items()},
+            "headline": task.headline,
+            "heading": task.heading_field,
+            "goal": task.goal_fields,
+            "radius": task.goal_radius,
+            "pump": task.pumping / options.mass_offset_range,
+        }
+    return {"walker": fields(WALKER), "tasks": described}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--check", action="store_true", help="only say whether the module is stale")
-    if parser.parse_args().check:
-        stale = digest_in(MODULE.read_bytes()) != digest_of_sources()
-        sys.exit("the module is stale: run web/build_kernel.py" if stale else 0)
-    module = build()
-    MODULE.parent.mkdir(parents=True, exist_ok=True)
-    MODULE.write_bytes(module)
-    LAYOUT.write_text(layout())
-    VEHICLES.write_text(vehicles())
-    print(f"{MODULE}: {len(module)} bytes")
+    parser.add_argument("--check", action="store_true", help="only say whether a module is stale")
+    check = parser.parse_args().check
+    os.environ.update(_NUMBA)
+    for part in (KERNEL, TASKS_PART):
+        if not is_stale(part):
+            continue
+        if check:
+            sys.exit(f"{part.path.name} is stale: run web/build_kernel.py")
+        module = build(part)
+        part.path.parent.mkdir(parents=True, exist_ok=True)
+        part.path.write_bytes(module)
+        print(f"{part.path}: {len(module)} bytes")
+    if not check:
+        LAYOUT.write_text(layout())
+        VEHICLES.write_text(vehicles())
+        TASKS.write_text(json.dumps(tasks()) + "\n")
 
 
 if __name__ == "__main__":

@@ -203,8 +203,7 @@ def basin(
 def bicycle(
     speeds: Speeds = "0:10:11",
     benchmark: Annotated[
-        bool,
-        typer.Option("--benchmark", help="The 2007 benchmark bicycle instead of the paper's."),
+        bool, typer.Option("--benchmark", help="The 2007 benchmark bicycle instead of the paper's.")
     ] = False,
     parameters: Annotated[
         Path | None,
@@ -326,13 +325,26 @@ def play(
 @command()
 def view(
     walk: Annotated[Path | None, typer.Option(help="Show this walk, saved with Walk.save.")] = None,
+    task: Annotated[str | None, typer.Option(help="Show this task, such as Slalom.")] = None,
+    agent: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Who walks it: ppo or another trained agent, fixed, or you. Several race when it is given several times."
+        ),
+    ] = None,
+    agent_path: Annotated[
+        Path | None,
+        typer.Option(help="Folder with a policy of your own training, which walks its task."),
+    ] = None,
     port: Annotated[int, typer.Option(help="Of this machine; 0 takes a free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
 ) -> Output:
     """Show the walkers in the browser, computed there by the package's own kernel; served to this machine only."""
     from lean_yaw_env.viewer import view as view_page
 
-    server = view_page(walk, port=port, open_browser=browser)
+    server = view_page(
+        walk, task=task, agents=agent or (), policy=agent_path, port=port, open_browser=browser
+    )
 
     def serve() -> None:
         typer.echo(f"the page is at {server.address} until Ctrl-C")

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from lean_yaw_env.viewer.notebook import PageDisplay
-from lean_yaw_env.viewer.server import PAGE, PageServer, view
+from lean_yaw_env.viewer.server import PAGE, PageServer, view, write_page
 
-__all__ = ["PAGE", "PageDisplay", "PageServer", "view"]
+__all__ = ["PAGE", "PageDisplay", "PageServer", "view", "write_page"]

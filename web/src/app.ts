@@ -2,7 +2,7 @@
 
 import type { Kernel } from "./kernel/kernel";
 import type { Name } from "./scene/labels";
-import type { Stage } from "./scene/stage";
+import type { Stage, View } from "./scene/stage";
 import type { Settings } from "./share/link";
 
 /** A tab of the page. */
@@ -14,6 +14,8 @@ export interface Exhibit {
   readonly isWalk: boolean;
   /** Whether arrow keys to the left and right do anything. */
   readonly isSteered: boolean;
+  /** Whether the visitor may push. */
+  readonly isPushed: boolean;
   enter(settings: Settings): void;
   leave(): void;
   /** Let time pass, in units of the exhibit's model; zero while paused. `real`: seconds since the last frame. */
@@ -48,4 +50,5 @@ export interface App {
   changed(): void;
   play(playing: boolean): void;
   setRate(rate: number): void;
+  setView(view: View): void;
 }

@@ -1,6 +1,7 @@
 import "./style.css";
 import type { App, Exhibit } from "./app";
 import { BicycleExhibit, SkateboardExhibit } from "./exhibits/vehicle_exhibit";
+import { TaskExhibit } from "./exhibits/task_exhibit";
 import { WalkExhibit } from "./exhibits/walk_exhibit";
 import { Kernel } from "./kernel/kernel";
 import { Labels } from "./scene/labels";
@@ -8,6 +9,8 @@ import { Stage, type View } from "./scene/stage";
 import { makeGif } from "./share/film";
 import { FrameTimes } from "./share/frame_times";
 import { readLink, writeLink, type Settings } from "./share/link";
+import { agentIndex, LinearAgent, loadPolicy } from "./tasks/agents";
+import { TaskModule } from "./tasks/episode";
 import { units } from "./share/units";
 import { parseWalk, type SavedWalk } from "./share/files";
 import { byId, h } from "./ui/dom";
@@ -44,10 +47,14 @@ async function main(): Promise<void> {
       rate = value;
       transport.showRate(value);
     },
+    setView(view) {
+      stage.setView(view);
+      transport.showView(view);
+    },
   };
   const exhibits: Exhibit[] = [
     new SkateboardExhibit(app), new BicycleExhibit(app), new WalkExhibit(app, "planar"), new WalkExhibit(app, "passive"),
-    new WalkExhibit(app, "steered"),
+    new WalkExhibit(app, "steered"), new TaskExhibit(app),
   ]; // prettier-ignore
   const frames = new FrameTimes(byId("frames"));
   const switcher = new UnitsSwitch(byId("units"), () => {
@@ -55,7 +62,7 @@ async function main(): Promise<void> {
     app.changed();
   });
   const share = new SharePanel(canvas, {
-    table: () => (active instanceof WalkExhibit ? active.table() : null),
+    table: () => (active instanceof WalkExhibit || active instanceof TaskExhibit ? active.table() : null),
     open: openWalk,
     next(duration) {
       active.frame(duration * rate * active.timeScale(), duration);
@@ -99,7 +106,7 @@ async function main(): Promise<void> {
     tabs.get(exhibit)!.scrollIntoView({ block: "nearest", inline: "center" });
     byId("panel-title").textContent = exhibit.title;
     byId("panel-subtitle").textContent = exhibit.subtitle;
-    transport.setKind(exhibit.isWalk, exhibit.isSteered);
+    transport.setKind(exhibit);
     share.setWalk(exhibit.isWalk);
     exhibit.enter(from);
     if (!playing) exhibit.frame(0, 0);
@@ -132,7 +139,7 @@ async function main(): Promise<void> {
   switcher.restore(link);
   if (link.quality) stage.setQuality(Number(link.quality));
   if (Number(link.rate) > 0) app.setRate(Number(link.rate));
-  open(exhibits.find((exhibit) => exhibit.id === link.tab) ?? exhibits.at(-1)!, link);
+  open(exhibits.find((exhibit) => exhibit.id === link.tab) ?? exhibits.find((exhibit) => exhibit.id === "steered")!, link);
   // `lean-yaw view --walk FILE` serves the file beside the page
   if (link.walk) {
     const address = new URL(link.walk, location.href);
@@ -162,7 +169,8 @@ async function main(): Promise<void> {
   requestAnimationFrame(frame);
   document.documentElement.dataset.ready = "true";
   // For tests, and for whoever wants to look closer from the console
-  const look = { kernel, stage, exhibits, active: () => active, frames, units, makeGif, ready: performance.now() - began };
+  const tasks = { load: () => TaskModule.load(kernel), loadPolicy, agentIndex, LinearAgent };
+  const look = { kernel, stage, tasks, exhibits, active: () => active, frames, units, makeGif, ready: performance.now() - began };
   Object.assign(window, { leanYaw: look });
 }
 

@@ -42,6 +42,7 @@ const degrees = (value: number) => `${number((value * 180) / Math.PI, 1)}°`;
 abstract class VehicleExhibit implements Exhibit {
   readonly isWalk = false;
   readonly isSteered = true;
+  readonly isPushed = true;
   abstract readonly id: string;
   abstract readonly title: string;
   abstract readonly subtitle: string;

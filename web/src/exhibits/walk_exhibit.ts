@@ -9,16 +9,13 @@ import { PhasePanel, ReturnMapPanel } from "../panels/phase";
 import { findCycle, type Cycle } from "../physics/cycle";
 import { CycleFinder } from "../physics/finder";
 import { passiveCycleNear } from "../physics/passive_cycle";
-import { add, halfArc, shapeOf, type Vector } from "../physics/geometry";
+import { add } from "../physics/geometry";
 import { Walk, type Kind, type StepRecord } from "../physics/walk";
 import { mirrored, TABLE_1, type Parameters } from "../physics/walker";
 import type { State } from "../kernel/kernel";
-import { Footprints } from "../scene/footprints";
 import type { Name } from "../scene/labels";
-import { PALETTE } from "../scene/palette";
 import { PushArrow } from "../scene/push_arrow";
-import { Trail } from "../scene/trail";
-import { WalkerModel } from "../scene/walker_model";
+import { StagedWalk } from "../scene/staged_walk";
 import { asTable, parametersOf, type SavedWalk } from "../share/files";
 import type { Settings } from "../share/link";
 import * as units from "../share/units";
@@ -116,23 +113,9 @@ export const VARIETIES: Record<Kind, Variety> = {
 const STEER_OFFSET = 0.045;
 const STRIDE_CHANGE = 0.02;
 const COMPANY_GAP = 0.85;
-const PATH_POINTS = 14;
-/** A walker in the plane has no hip width; it is drawn with one, so that its legs can be told apart. */
-const DRAWN_WIDTH = 0.17;
 /** Scale of the stage for so many walkers side by side. */
 const SCALES: Record<number, number> = { 1: 1, 2: 1.2, 4: 1.6, 8: 2.3 };
 const TINTS = ["", "#168e68", "#8c6eb4", "#be265c", "#b98a12", "#3b8ea5", "#7a5c45", "#5c5e66"];
-
-interface Companion {
-  walk: Walk;
-  model: WalkerModel;
-  trail: Trail;
-  prints: Footprints;
-  tint: string;
-  /** The centre's path in the step on the way, and how many of its points are drawn. */
-  path: Vector[];
-  drawn: number;
-}
 
 /** A part of the guided tour. */
 interface Lesson {
@@ -171,6 +154,7 @@ const TOUR: Lesson[] = [
 
 export class WalkExhibit implements Exhibit {
   readonly isWalk = true;
+  readonly isPushed = true;
   readonly isSteered: boolean;
   readonly id: string;
   readonly title: string;
@@ -190,7 +174,7 @@ export class WalkExhibit implements Exhibit {
   private readonly arrow = new PushArrow();
   private readonly tour = h("div", { class: "tour" });
   private panels: Node[] = [];
-  private company: Companion[] = [];
+  private company: StagedWalk[] = [];
   private cycle: Cycle | null = null;
   private lastGait: State;
   private steering = 0;
@@ -246,7 +230,7 @@ export class WalkExhibit implements Exhibit {
     this.app.stage.setScale(1);
     this.basin.stop();
     this.arrow.mesh.removeFromParent();
-    this.company.forEach(removeCompanion);
+    this.company.forEach((staged) => staged.dispose());
     this.company = [];
   }
 
@@ -283,47 +267,37 @@ export class WalkExhibit implements Exhibit {
       state[3] += pitchRate;
       state[4] += ankleRate;
     }
-    this.company.forEach(removeCompanion);
+    this.company.forEach((staged) => staged.dispose());
     this.company = Array.from({ length: this.replay ? 1 : this.companions }, (_, k) => this.companion(state, k));
     this.pushes = { pitchRate: 0, ankleRate: 0, direction: 1 };
     this.phase.clear();
     this.returnMap.clear();
     this.app.notice(null);
     this.app.stage.setSlope(this.parameters.slope);
-    this.company.forEach((companion) => this.walkOn(companion));
+    this.company.forEach((staged) => this.begun(staged));
     this.place(0, true);
     this.drawPlots();
   }
 
-  private companion(gait: State, k: number): Companion {
+  private companion(gait: State, k: number): StagedWalk {
     const tint = TINTS[k % TINTS.length];
     const lane = (k % 2 ? 1 : -1) * Math.ceil(k / 2) * COMPANY_GAP;
     // the others are disturbed one way and the other, ever more
     const state = [...gait];
     state[3] += 0.6 * k * this.variety.nudge[0];
     state[4] += (k % 2 ? -0.6 : 0.6) * k * this.variety.nudge[1];
-    const companion = {
-      model: new WalkerModel(tint || undefined),
-      trail: new Trail(tint || PALETTE.path),
-      prints: new Footprints(),
-      tint,
-      path: [],
-      drawn: 0,
-    } as unknown as Companion;
-    companion.walk = this.replay
+    const walk = this.replay
       ? this.replayed(this.replay)
       : new Walk(this.app.kernel, this.kind, { state, contact: [0, lane], offset: this.parameters.mass_offset }, () => this.order(k));
-    companion.walk.onStep = (record) => {
+    const staged = new StagedWalk(walk, this.app.stage, tint);
+    walk.onStep = (record) => {
       if (k === 0) this.stepped(record);
-      this.walkOn(companion);
+      this.begun(staged);
     };
-    companion.walk.onFall = (record) => {
+    walk.onFall = (record) => {
       if (k === 0) this.fell(record);
     };
-    this.app.stage.world.add(companion.model.group, companion.trail.group, companion.prints.mesh);
-    const { clientWidth, clientHeight } = this.app.stage.canvas;
-    companion.trail.resize(clientWidth / Math.max(clientHeight, 1), clientHeight);
-    return companion;
+    return staged;
   }
 
   private replayed(saved: SavedWalk): Walk {
@@ -337,17 +311,10 @@ export class WalkExhibit implements Exhibit {
     });
   }
 
-  /** Footprint and centre's path of the step that begins. */
-  private walkOn(companion: Companion): void {
-    const { walk, trail, prints, tint } = companion;
-    const { current } = walk;
-    trail.extend(companion.path.slice(companion.drawn));
-    companion.path = walk.centrePath(PATH_POINTS);
-    companion.drawn = 0;
-    const { foot_radius: radius } = current.parameters;
-    const rolled = Math.min(radius * Math.abs(current.interLeg) * 1.15, 2 * halfArc(radius) * radius);
-    prints.add(this.apart(current).contact, current.state[0], current.side, rolled, tint || undefined);
-    if (walk === this.company[0]?.walk) this.phase.add(current.side, walk.phase());
+  private begun(staged: StagedWalk): void {
+    staged.begin();
+    const { walk } = staged;
+    if (walk === this.company[0]?.walk) this.phase.add(walk.current.side, walk.phase());
   }
 
   private order(k: number) {
@@ -377,30 +344,13 @@ export class WalkExhibit implements Exhibit {
   }
 
   private place(real: number, jump: boolean): void {
-    for (const companion of this.company) {
-      const { walk, model, trail } = companion;
-      const drawn = this.drawn(walk.current.parameters);
-      model.update(drawn, shapeOf(drawn, this.apart(walk.pose())));
-      const reached = Math.floor(walk.share * (PATH_POINTS - 1)) + 1;
-      if (reached > companion.drawn) trail.extend(companion.path.slice(companion.drawn, reached));
-      companion.drawn = Math.max(companion.drawn, reached);
-    }
-    const { centre } = shapeOf(this.drawn(this.walk.current.parameters), this.apart(this.walk.pose()));
+    for (const staged of this.company) staged.place();
+    const { centre } = this.company[0].shape();
     // what is looked at goes along without swaying from foot to foot
     const sway = jump ? 1 : 1 - Math.exp(-real / 0.4);
     this.aside += sway * (centre[2] - this.aside);
     this.app.stage.follow(new THREE.Vector3(centre[0], 0.5, this.aside), this.walk.current.state[0], real, jump);
     this.arrow.place(centre, this.walk.current.state[0]);
-  }
-
-  private drawn(p: Parameters): Parameters {
-    return this.kind === "planar" ? { ...p, hip_width: DRAWN_WIDTH } : p;
-  }
-
-  private apart<Placed extends { contact: [number, number]; side: number }>(placed: Placed): Placed {
-    if (this.kind !== "planar") return placed;
-    const [x, z] = placed.contact;
-    return { ...placed, contact: [x, z - 0.5 * placed.side * DRAWN_WIDTH] };
   }
 
   private stepped(record: StepRecord): void {
@@ -621,8 +571,7 @@ export class WalkExhibit implements Exhibit {
   }
 
   resize(): void {
-    const { clientWidth, clientHeight } = this.app.stage.canvas;
-    for (const { trail } of this.company) trail.resize(clientWidth / Math.max(clientHeight, 1), clientHeight);
+    for (const staged of this.company) staged.resize();
     this.drawPlots();
   }
 
@@ -659,8 +608,8 @@ export class WalkExhibit implements Exhibit {
   }
 
   names(): Name[] {
-    const drawn = this.drawn(this.walk.current.parameters);
-    const shape = shapeOf(drawn, this.apart(this.walk.pose()));
+    const drawn = this.company[0].parameters;
+    const shape = this.company[0].shape();
     const leg = this.walk.side === 1 ? shape.left : shape.right;
     const swing = this.walk.side === 1 ? shape.right : shape.left;
     const names: Name[] = [
@@ -680,19 +629,12 @@ export class WalkExhibit implements Exhibit {
   }
 }
 
-function removeCompanion({ model, trail, prints }: Companion): void {
-  model.dispose();
-  trail.dispose();
-  prints.mesh.removeFromParent();
-  prints.mesh.dispose();
-}
-
-function fact(name: string, value: string): HTMLElement {
+export function fact(name: string, value: string): HTMLElement {
   return h("span", {}, h("small", {}, name), value);
 }
 
 /** Where the masses are along the axle. */
-function steeringBar(offset: number): HTMLElement {
+export function steeringBar(offset: number): HTMLElement {
   const share = 50 + 50 * Math.max(-1, Math.min(1, offset / 0.06));
   return h("span", { class: "steering" }, h("small", {}, "masses"), h("i", {}, h("b", { style: `left:${share}%` })));
 }

@@ -12,6 +12,7 @@ const AXIS_BELOW = 0.035;
 const UPPER = 0.5;
 const MASS = 0.051;
 const AXLE_END = 0.115;
+const GHOST = 0.42; // opacity
 
 interface LegParts {
   upper: THREE.Group;
@@ -29,8 +30,9 @@ export class WalkerModel {
   private readonly materials = makeMaterials();
   private built = "";
 
-  /** `tint` paints both legs, to tell several walkers apart. */
-  constructor(tint?: string) {
+  /** `tint` paints both legs, to tell several walkers apart; a ghost is seen through, and casts no shadow. */
+  constructor(tint?: string, private readonly isGhost = false) {
+    if (isGhost) for (const material of Object.values(this.materials)) [material.transparent, material.opacity] = [true, GHOST];
     if (tint) {
       this.materials.left.color.set(tint);
       this.materials.right.color.set(tint).offsetHSL(0, 0, 0.12);
@@ -45,7 +47,8 @@ export class WalkerModel {
       return mass;
     });
     for (const leg of [this.left, this.right]) this.group.add(leg.upper, leg.lower, leg.foot);
-    this.group.add(this.axle, ...this.masses, this.centre);
+    this.group.add(this.axle, ...this.masses);
+    if (!isGhost) this.group.add(this.centre);
   }
 
   update(p: Parameters, shape: WalkerShape): void {
@@ -80,7 +83,7 @@ export class WalkerModel {
       cap.position.z = 0.5 * side * length;
       this.axle.add(cap);
     }
-    shadowed(this.group);
+    if (!this.isGhost) shadowed(this.group);
   }
 }
 

@@ -33,6 +33,11 @@ export class Facts {
   readonly element = h("dl", { class: "facts" });
   private readonly values = new Map<string, HTMLElement>();
 
+  clear(): void {
+    this.values.clear();
+    this.element.replaceChildren();
+  }
+
   set(name: string, value: string, title = ""): void {
     let cell = this.values.get(name);
     if (!cell) {

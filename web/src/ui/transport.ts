@@ -39,6 +39,8 @@ export class Transport {
   private readonly rateOutput: HTMLOutputElement;
   private readonly namesButton: HTMLButtonElement;
   private readonly stepButton: HTMLButtonElement;
+  private readonly pushButton: HTMLButtonElement;
+  private readonly viewMenu: HTMLSelectElement;
   private readonly held = new Set<string>();
 
   constructor(place: HTMLElement, stage: HTMLElement, private readonly actions: Actions) {
@@ -58,6 +60,8 @@ export class Transport {
     const names = button("names", "Names of the parts (N)", () => this.toggleNames(), "names");
     this.namesButton = names;
     this.stepButton = step;
+    this.pushButton = push;
+    this.viewMenu = view;
     place.append(
       button("reset", "Start again (R)", () => actions.reset(), "reset"), this.playButton, step,
       h("span", { class: "rate" }, h("label", { for: "rate" }, "speed"), this.rateInput, this.rateOutput),
@@ -68,10 +72,15 @@ export class Transport {
     this.touch();
   }
 
-  /** Only a walk has steps; not everything can be steered. */
-  setKind(isWalk: boolean, isSteered: boolean): void {
+  /** Only a walk has steps; not everything can be steered, or pushed. */
+  setKind({ isWalk, isSteered, isPushed }: { isWalk: boolean; isSteered: boolean; isPushed: boolean }): void {
     byId("touch").classList.toggle("off", !isSteered);
     this.stepButton.hidden = !isWalk;
+    this.pushButton.hidden = !isPushed;
+  }
+
+  showView(view: View): void {
+    this.viewMenu.value = view;
   }
 
   private toggleNames(): void {
