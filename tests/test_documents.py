@@ -68,7 +68,7 @@ threading.Thread(target=close_windows, daemon=True).start()
     },
 }
 """Modules in place of clusters and of a person who closes a window; ``stand_in`` is imported first."""
-BLOCK = re.compile(r"^```(.*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+BLOCK = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 PROGRAMS = re.compile(r"(pip|python|pytest|lean-yaw|npm|dask) ")
 PYTHON_BLOCK = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 FENCED = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
