@@ -20,7 +20,7 @@ from typer import Argument, Option
 
 from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.registration import TASK_VERSIONS
-from lean_yaw_env.reporting import keep, reported
+from lean_yaw_env.reporting import keep, reporting
 
 ALL = "all"
 CACHE = "evaluations"
@@ -47,7 +47,7 @@ AsJson = Annotated[bool, Option("--json", help="Print JSON instead of tables.")]
 
 def _command(name: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """A decorator that makes a function a command of the app, which reports its errors and what installs a library that it lacks."""
-    return lambda function: app.command(name)(reported(name)(needs_extra("train")(function)))
+    return lambda function: app.command(name)(reporting(name)(needs_extra("train")(function)))
 
 
 @app.callback()

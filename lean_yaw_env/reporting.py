@@ -10,10 +10,9 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from functools import wraps
+from collections.abc import Iterator
 from types import FrameType
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn
 
 from lean_yaw_env.errors import LeanYawError
 
@@ -21,8 +20,6 @@ WRONG_INPUT, NO_RESULT = 2, 1
 """Exit statuses for a bad value or file, and for work without a result."""
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _PATIENCE = 1.0  # seconds from a signal to the end of a process that does not end by itself
-
-Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 class _State:
@@ -36,20 +33,6 @@ class _State:
 def keep(words: str) -> None:
     """Set what the running command says if it is interrupted: what is kept, and how to continue."""
     _State.kept = words
-
-
-def reported(program: str) -> Callable[[Function], Function]:
-    """A decorator that runs a function within ``reporting``."""
-
-    def decorate(function: Function) -> Function:
-        @wraps(function)
-        def command(*arguments: Any, **options: Any) -> Any:
-            with reporting(program):
-                return function(*arguments, **options)
-
-        return command  # type: ignore[return-value]
-
-    return decorate
 
 
 @contextlib.contextmanager

@@ -120,15 +120,15 @@ def test_map_of_passive_walkers_reproduces_figure_8() -> None:
 @pytest.mark.parametrize("name", ["map.nc", "map.zarr"])
 def test_interrupted_map_goes_on_where_it_was(name: str, tmp_path: Path, monkeypatch) -> None:
     path = tmp_path / name
-    whole = stability_map(TABLE_1, AXES)
     monkeypatch.setattr(filling, "_FEWEST", 4)
+    whole = stability_map(TABLE_1, AXES)
     find, calls = gait_map.gaits_at, []
 
-    def interrupted(section_map, points, guesses):
+    def interrupted(section_map, points, guesses, **options):
         calls.append(points)
         if len(calls) == 2:
             raise KeyboardInterrupt
-        return find(section_map, points, guesses)
+        return find(section_map, points, guesses, **options)
 
     monkeypatch.setattr(gait_map, "gaits_at", interrupted)
     with pytest.raises(KeyboardInterrupt):
@@ -138,7 +138,6 @@ def test_interrupted_map_goes_on_where_it_was(name: str, tmp_path: Path, monkeyp
     # what was done is not done again: the next region is the second width's
     assert (calls[2]["hip_width"][0], calls[2]["ankle_tilt"][0]) == (WIDTHS[1], TILTS[0])
     assert resumed.identical(stored(path))
-    # other batches, other neighbours in a vector: bit for bit the same all the same
     assert resumed.equals(whole)
     assert [p.name for p in tmp_path.iterdir()] == [name]
 
@@ -280,6 +279,20 @@ def test_bad_disturbances_are_refused() -> None:
         basin(TABLE_1, ("heading", [0.0, 0.0]), ("ankle_angle", [0.0]))
     with pytest.raises(NoGaitError):
         basin(Walker(WalkerParameters(slope=0.0)), ("heading", [0.0]), ("ankle_angle", [0.0]))
+
+
+def test_gaits_followed_along_hip_width_are_those_followed_from_none() -> None:
+    tilts, widths = np.linspace(0.1, 1.2, 12), np.linspace(0.0, 0.6, 25)
+    section_map = section_map_of(TABLE_1)
+    points = dict(zip(("ankle_tilt", "hip_width"), map(np.ravel, np.meshgrid(tilts, widths, indexing="ij")), strict=True))  # fmt: skip
+    rows = gait_map.gaits_at(section_map, points, None, in_row=widths.size)
+    alone = gait_map.gaits_at(section_map, points, None)
+    assert 0.2 < (alone["status"] == 1).mean() < 0.9
+    found = (rows["status"] == 1) & (alone["status"] == 1)
+    # a row ends at its first failure, which neighbours in the map may fill; beyond it little is found
+    assert np.mean(rows["status"] == alone["status"]) > 0.98
+    # two searches, each stopping at 1e-12, through multipliers near one
+    assert rows["state"][found] == pytest.approx(alone["state"][found], abs=1e-9)
 
 
 def test_no_point_without_a_gait_has_a_neighbour_whose_gait_leads_to_one() -> None:

@@ -147,22 +147,54 @@ def solve_grid(grid: WalkerGrid, guesses: Vector) -> GridGaits:
     """Newton's method from a guess for each walker, shape (n, 5)."""
     search = _Search(grid.n)
     found = search.solve(grid, guesses, np.arange(grid.n), is_last=np.ones(grid.n, dtype=bool))
-    return _described(grid, search, found)
+    return _described(grid, found, search.states, search.matrices)
 
 
-def follow_grid(grid: WalkerGrid, starts: Vector) -> GridGaits:
-    """Follow each gait from no hip width and no offset, where ``starts`` (n, 5) are gaits.
+def follow_grid(grid: WalkerGrid, starts: Vector, in_row: int = 1) -> GridGaits:
+    """Follow each gait from no hip width and no offset, where ``starts`` (rows, 5) are gaits.
 
     So the gait found is of that branch, where several exist, and none beyond a fold. A narrow walker stands no offset: where hip width and
     offsets cannot grow together, the offsets grow last.
+
+    Rows of ``in_row`` walkers differ in their hip widths only, which grow, and have no offsets if they are more than one. Then each gait
+    is followed from the one before it in its row, and from no hip width where that fails. A row ends where both fail.
     """
-    search = _Search(grid.n)
-    found = np.zeros(grid.n, dtype=bool)
-    who = np.flatnonzero(_is_sane(starts))
-    found[who] = _follow(grid, starts, search, who, width_first=False)
-    who = who[~found[who] & (grid.offsets[who] != 0.0).any(axis=1)]
-    found[who] = _follow(grid, starts, search, who, width_first=True)
-    return _described(grid, search, found)
+    rows = np.arange(grid.n).reshape(-1, in_row)
+    place = np.zeros(len(rows), dtype=np.intp)
+    search, found = _Search(len(rows)), np.zeros(grid.n, dtype=bool)
+    states, matrices = np.empty((grid.n, STATE_SIZE)), np.empty((grid.n, STATE_SIZE, STATE_SIZE))
+    waiting = np.flatnonzero(_is_sane(starts))
+    while waiting.size:
+        walkers = grid.at(rows[np.arange(len(rows)), np.minimum(place, in_row - 1)])
+        going, waiting = _followed(walkers, starts, search, waiting), waiting[:0]
+        while going.size:
+            here = rows[going, place[going]]
+            found[here], states[here], matrices[here] = True, search.states[going], search.matrices[going]  # fmt: skip
+            place[going] += 1
+            going = going[place[going] < in_row]
+            there = rows[going, place[going]]
+            guesses = _extrapolated(grid.bodies[:, _HIP_WIDTH], states, there, place[going])
+            last = np.ones(going.size, dtype=bool)
+            done = search.solve(grid.at(there), guesses, going, last)
+            waiting, going = np.append(waiting, going[~done]), going[done]
+    return _described(grid, found, states, matrices)
+
+
+def _extrapolated(widths: Vector, states: Vector, index: Index, place: Index) -> Vector:
+    """States of walkers guessed from those of the two before each in its row; of the second walker of a row, that of the first."""
+    guesses = states[index - 1]
+    some = index[place > 1]
+    share = (widths[some] - widths[some - 1]) / (widths[some - 1] - widths[some - 2])
+    guesses[place > 1] += share[:, None] * (states[some - 1] - states[some - 2])
+    return guesses
+
+
+def _followed(grid: WalkerGrid, starts: Vector, search: _Search, who: Index) -> Index:
+    """Those of some walkers whose gaits can be followed from no hip width and no offset."""
+    together = _follow(grid, starts, search, who, width_first=False)
+    rest = who[~together & (grid.offsets[who] != 0.0).any(axis=1)]
+    after = _follow(grid, starts, search, rest, width_first=True)
+    return np.concatenate([who[together], rest[after]])
 
 
 def _follow(
@@ -288,10 +320,10 @@ def _is_sane(states: Vector) -> Flags:
     return np.isfinite(states).all(axis=1) & np.all(is_upright, axis=1)
 
 
-def _described(grid: WalkerGrid, search: _Search, found: Flags) -> GridGaits:
+def _described(grid: WalkerGrid, found: Flags, states: Vector, matrices: Vector) -> GridGaits:
     """The gaits found, with both steps and the stride's Jacobian."""
     index = np.flatnonzero(found)
-    some, states, strides = grid.at(index), search.states[index], search.matrices[index]
+    some, states, strides = grid.at(index), states[index], matrices[index]
     first = some.step(states, 0)
     outcomes = np.stack([first, some.step(first[:, :STATE_SIZE], 1)], axis=1)
     strides[some.is_symmetric] = strides[some.is_symmetric] @ strides[some.is_symmetric]

@@ -60,7 +60,7 @@ NUMBERS = (
 """One value at each point: the largest multiplier's magnitude, and properties of ``LimitCycle``."""
 
 _CHUNK = 2048
-"""Points at a time: what is needed beside a region's result does not grow with their number."""
+"""Rows of points at a time: what is needed beside a region's result does not grow with their number."""
 _STARTS = 8
 """Walkers that only pumping drives, among those of a chunk, for which a gait is looked for anew until one is found."""
 _NEAR = 0.1
@@ -134,10 +134,13 @@ class _Gaits:
         mine[points_of(inner, grid.shape)] = True
         if number == 0:
             values, passes = _empty(grid.section_map, grid.n), np.full(grid.n, -1, dtype=np.int16)
-            for first in range(0, grid.n, _CHUNK):
-                chunk = np.arange(first, min(first + _CHUNK, grid.n))
-                for name, rows in gaits_at(grid.section_map, grid.points(chunk), None).items():
-                    values[name][chunk] = rows
+            rows = grid.rows
+            for first in range(0, len(rows), _CHUNK):
+                chunk = rows[first : first + _CHUNK]
+                points = grid.points(chunk.ravel())
+                here = gaits_at(grid.section_map, points, None, in_row=rows.shape[1])
+                for name, column in here.items():
+                    values[name][chunk.ravel()] = column
             fresh = np.flatnonzero(values["status"] == FOUND)
         else:
             passes = read_box(arrays, PASSES, box)
@@ -176,11 +179,12 @@ def map_cost(
 ) -> tuple[float, float]:
     """Estimate what a ``stability_map`` costs with one thread: bytes of memory without a Zarr store, and seconds from some of its points on this machine."""
     grid = _Grid(section_map_of(walker, **command), axes)
-    sample = np.linspace(0, grid.n - 1, min(grid.n, 16)).astype(np.intp)
-    gaits_at(grid.section_map, grid.points(sample[:1]), None)  # compiles
+    rows = grid.rows
+    rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), 16)).astype(np.intp)]
+    gaits_at(grid.section_map, grid.points(rows[0, :1]), None)  # compiles
     began = time.process_time()
-    gaits_at(grid.section_map, grid.points(sample), None)
-    each = (time.process_time() - began) / len(sample)
+    gaits_at(grid.section_map, grid.points(rows.ravel()), None, in_row=rows.shape[1])
+    each = (time.process_time() - began) / rows.size
     return grid.n * _bytes(grid), grid.n * each
 
 
@@ -222,6 +226,20 @@ class _Grid:
         part.axes = {name: axis[s] for (name, axis), s in zip(self.axes.items(), box, strict=True)}
         return part
 
+    @property
+    def rows(self) -> NDArray[np.intp]:
+        """All points (rows, in row), those of a row along growing hip width where ``follow_grid`` follows gaits along it."""
+        points = np.arange(self.n).reshape(self.shape)
+        section_map, commands = self.section_map, COMMAND_PARAMETERS[1:]
+        if (
+            not isinstance(section_map, ActiveMap)
+            or "hip_width" not in self.axes
+            or any(name in self.axes or section_map.value(name) != 0.0 for name in commands)
+        ):
+            return points.reshape(-1, 1)
+        along = list(self.axes).index("hip_width")
+        return np.moveaxis(points, along, -1).reshape(-1, self.shape[along])
+
     def points(self, index: NDArray[np.intp]) -> dict[str, Vector]:
         """The parameters of some points."""
         places = np.unravel_index(index, self.shape)
@@ -249,14 +267,14 @@ def _set_eigenvalues(
 
 
 def gaits_at(
-    section_map: SectionMap, points: Mapping[str, Vector], guesses: Vector | None
+    section_map: SectionMap, points: Mapping[str, Vector], guesses: Vector | None, in_row: int = 1
 ) -> Columns:
     """The map's variables, n rows each, where the map is moved to n points: by parameter, its values (n,).
 
-    Gaits are looked for anew, or found from guesses (n, k) that are near them.
+    Gaits are looked for anew, along rows of points (see ``follow_grid``), or found from guesses (n, k) that are near them.
     """
     if isinstance(section_map, ActiveMap):
-        return _at_once(section_map, points, guesses)
+        return _at_once(section_map, points, guesses, in_row)
     return _one_by_one(section_map, points, guesses)
 
 
@@ -287,21 +305,22 @@ def _one_by_one(
 
 
 def _at_once(
-    section_map: ActiveMap, points: Mapping[str, Vector], guesses: Vector | None
+    section_map: ActiveMap, points: Mapping[str, Vector], guesses: Vector | None, in_row: int
 ) -> Columns:
     grid = walker_grid(section_map, points)
     if guesses is not None:
         gaits = solve_grid(grid, guesses)
         distance = np.abs(gaits.states - guesses[gaits.index]).max(axis=1, initial=0.0)
         return _columns(section_map, grid, gaits.at(distance <= _NEAR))
-    radius, slope = (grid.bodies[:, Body._fields.index(k)] for k in ("foot_radius", "slope"))
-    numbers = np.column_stack([radius, slope, grid.inter_leg_angles])
-    starts = np.zeros((grid.n, STATE_SIZE))
-    starts[:, 1] = 0.5 * grid.inter_leg_angles
+    first = grid.at(np.arange(0, grid.n, in_row))
+    radius, slope = (first.bodies[:, Body._fields.index(k)] for k in ("foot_radius", "slope"))
+    numbers = np.column_stack([radius, slope, first.inter_leg_angles])
+    starts = np.zeros((first.n, STATE_SIZE))
+    starts[:, 1] = 0.5 * first.inter_leg_angles
     starts[:, 3] = [planar_rate(r, g, angle, 0.0) for r, g, angle in numbers.tolist()]
-    values = _columns(section_map, grid, follow_grid(grid, starts))
+    values = _columns(section_map, grid, follow_grid(grid, starts, in_row))
     # where only pumping drives the walker: one gait, from which neighbours are found
-    pumped = np.isnan(starts[:, 3]) & (grid.offsets[:, 0] != grid.offsets[:, 1])
+    pumped = np.repeat(np.isnan(starts[:, 3]), in_row) & (grid.offsets[:, 0] != grid.offsets[:, 1])
     candidates = np.flatnonzero(pumped)
     for i in candidates[
         np.linspace(0, candidates.size - 1, min(candidates.size, _STARTS), dtype=int)

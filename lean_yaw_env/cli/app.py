@@ -203,8 +203,7 @@ def basin(
 def bicycle(
     speeds: Speeds = "0:10:11",
     benchmark: Annotated[
-        bool,
-        typer.Option("--benchmark", help="The 2007 benchmark bicycle instead of the paper's."),
+        bool, typer.Option("--benchmark", help="The 2007 benchmark bicycle instead of the paper's.")
     ] = False,
     parameters: Annotated[
         Path | None,
