@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -64,6 +65,15 @@ class AgentRequest:
             if getattr(self, name) is not None:
                 require_path(getattr(self, name), name)
 
+    @property
+    def task(self) -> str:
+        return task_of(self.env_id)
+
+    @property
+    def layout(self) -> ObservationLayout:
+        """What the environment's observations hold."""
+        return ObservationLayout.of(self.task, self.options)
+
 
 @dataclass(frozen=True)
 class AgentEntry:
@@ -82,39 +92,25 @@ class AgentEntry:
         return replace(options, **self.options)
 
 
-def _layout(request: AgentRequest) -> ObservationLayout:
-    return ObservationLayout.of(task_of(request.env_id), request.options)
-
-
-def _feedback(request: AgentRequest) -> Agent:
-    return HeadingFeedback(task_of(request.env_id), request.options)
-
-
 def _lqr(request: AgentRequest) -> Agent:
-    task = task_of(request.env_id)
     # the same observations, and the settings tuned for more than one goal
-    return guided("Waypoint" if task == GOAL_TASK else task, request.options)
-
-
-def _linear(request: AgentRequest) -> Agent:
-    return LinearLaw(task_of(request.env_id), request.options)
+    return guided("Waypoint" if request.task == GOAL_TASK else request.task, request.options)
 
 
 def _mpc(request: AgentRequest) -> Agent:
-    task, base = task_of(request.env_id), make_base(request)[1]
-    return MpcController(task, request.options, base, seed=request.seed)
+    base = make_base(request)[1]
+    return MpcController(request.task, request.options, base, seed=request.seed)
 
 
 def make_base(request: AgentRequest) -> tuple[str, Agent]:
     """The agent that planners deviate from, with its name: the package's PPO; without one for these observations the regulator, or without a gait the
     fixed controller."""
-    task = task_of(request.env_id)
     for seed in shipped_seeds(request.env_id, "ppo")[:1]:
         policy = load(shipped_folder(request.env_id, "ppo", seed), env_id=request.env_id)
-        if policy.card.layout == ObservationLayout.of(task, request.options):
+        if policy.card.layout == request.layout:
             return "ppo", policy
     try:
-        return "lqr", guided(task, request.options)
+        return "lqr", guided(request.task, request.options)
     except NoGaitError:
         return "fixed", FixedController()
 
@@ -140,11 +136,15 @@ LINEAR_TASKS = tuple(all_settings().get("linear", {}))
 """Tasks for which a linear law was found."""
 
 AGENTS: dict[str, AgentEntry] = {
-    "random": AgentEntry("baseline", lambda asked: RandomController(asked.seed, _layout(asked))),
-    "fixed": AgentEntry("baseline", lambda asked: FixedController(_layout(asked))),
-    "feedback": AgentEntry("feedback", _feedback, _STEERED),
+    "random": AgentEntry("baseline", lambda asked: RandomController(asked.seed, asked.layout)),
+    "fixed": AgentEntry("baseline", lambda asked: FixedController(asked.layout)),
+    "feedback": AgentEntry(
+        "feedback", lambda asked: HeadingFeedback(asked.task, asked.options), _STEERED
+    ),
     "lqr": AgentEntry("feedback", _lqr, _REGULATED),
-    "linear": AgentEntry("feedback", _linear, LINEAR_TASKS),
+    "linear": AgentEntry(
+        "feedback", lambda asked: LinearLaw(asked.task, asked.options), LINEAR_TASKS
+    ),
     "mpc": AgentEntry("planner", _mpc, tuple(TASK_VERSIONS)),
     "ppo": AgentEntry("learned", _trained("ppo")),
     "sac": AgentEntry("learned", _trained("sac")),
@@ -181,20 +181,18 @@ def make_agent(name: str, request: AgentRequest) -> Agent:
         If it needs a gait that the walker of these options does not have.
     """
     entry = agent_entry(name)
-    task = task_of(require_instance("request", request, AgentRequest).env_id)
-    if task not in entry.tasks:
-        raise ValueError(f"{name} is an agent for {', '.join(entry.tasks)}, got {task!r}")
+    if require_instance("request", request, AgentRequest).task not in entry.tasks:
+        raise ValueError(f"{name} is an agent for {', '.join(entry.tasks)}, got {request.task!r}")
     return entry.make(request)
 
 
 def names_for(request: AgentRequest, kinds: Collection[Kind] = KINDS) -> tuple[str, ...]:
     """Names of the agents of some kinds that are for this task; of the learned, those that a training is found of."""
-    task = task_of(request.env_id)
     return tuple(
         name
         for name, entry in AGENTS.items()
         if entry.kind in kinds
-        and task in entry.tasks
+        and request.task in entry.tasks
         and (entry.kind != "learned" or policy_folders(name, request))
     )
 
@@ -203,10 +201,8 @@ def make_all(request: AgentRequest, kinds: Collection[Kind] = QUICK_KINDS) -> di
     """Every agent of some kinds that there is for this task, as ``names_for``, but for those that need a gait the walker does not have."""
     agents: dict[str, Agent] = {}
     for name in names_for(request, kinds):
-        try:
+        with suppress(NoGaitError):
             agents[name] = make_agent(name, request)
-        except NoGaitError:
-            continue
     return agents
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache
-from operator import attrgetter
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -79,8 +78,3 @@ def values_of(settings: Any, default: Any = None) -> Values:
         elif value != other:
             found[field.name] = list(value) if isinstance(value, tuple) else value
     return found
-
-
-def value_at(settings: Any, path: str) -> Any:
-    """The value at a path."""
-    return attrgetter(path)(settings)

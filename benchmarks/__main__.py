@@ -6,7 +6,7 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks import environments, kernel, startup, training
+from benchmarks import environments, infos, kernel, startup, training
 from benchmarks.compare import as_text as comparison_text
 from benchmarks.compare import compare, save_plot
 from benchmarks.measure import as_json, as_text, machine
@@ -18,16 +18,16 @@ RESULTS = Path(__file__).parent / "results"
 def main() -> None:
     """Measure all, print it, and keep it."""
     argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__).parse_args()
-    measurements = []
-    for benchmark in (kernel, environments, startup, training):
+    RESULTS.mkdir(exist_ok=True)
+    for benchmark in (kernel, environments, infos, startup, training):
         measured = benchmark.run(smallest=False)
         print(as_text(measured), end="\n\n", flush=True)
-        measurements += measured
+        name = benchmark.__name__.rpartition(".")[2]
+        write_json(RESULTS / f"{name}.json", as_json(measured))
     speeds = compare(smallest=False)
     print(comparison_text(speeds))
-    kept = as_json(measurements) | {"comparison": [asdict(speed) for speed in speeds]}
-    RESULTS.mkdir(exist_ok=True)
-    write_json(RESULTS / "full.json", kept)
+    kept = {"comparison": [asdict(speed) for speed in speeds], "machine": machine()}
+    write_json(RESULTS / "comparison.json", kept)
     save_plot(speeds, machine(), RESULTS / "comparison.png")
 
 

@@ -23,7 +23,6 @@ HEADING = "LeanYaw/Heading-v1"
 STEPS = 200  # of a single environment in a round
 SIZES = (1024, 16384)
 SMALLEST_SIZES = (8,)
-INFO_SIZES = (64, 1024)
 CARTPOLES = 1024
 
 
@@ -106,14 +105,6 @@ def _vector(effort: Effort, n: int, actions: str) -> list[Measurement]:
     ]
 
 
-def _infos(effort: Effort, n: int) -> Measurement:
-    """What infos add to the time of a step."""
-    steps = {info: vector_steps(walkers(n, step_info=info), "random") for info in (True, False)}
-    times = measure({str(info): step for info, step in steps.items()}, effort, f"infos of {n}")
-    cost = times.ratio("True", "False") - 1.0
-    return Measurement(f"infos_{n}_cost", 100.0 * cost, "%", "<=", 10.0, "random actions")
-
-
 def _against_others(effort: Effort, n: int, largest: int) -> list[Measurement]:
     """Against Gymnasium's vector of CartPoles, and two threads against one."""
     sync = gym.make_vec("CartPole-v1", num_envs=n, vectorization_mode="sync")
@@ -141,9 +132,8 @@ def run(smallest: bool) -> list[Measurement]:
     """All measurements of the environments."""
     effort, sizes, steps = (SMALLEST, SMALLEST_SIZES, 5) if smallest else (FULL, SIZES, STEPS)
     vectors = [_vector(effort, n, actions) for n in sizes for actions in ("fixed", "random")]
-    infos = [_infos(effort, n) for n in (SMALLEST_SIZES if smallest else INFO_SIZES)]
     others = _against_others(effort, 8 if smallest else CARTPOLES, sizes[-1])
-    return [*_single(effort, steps), *itertools.chain(*vectors), *infos, *others]
+    return [*_single(effort, steps), *itertools.chain(*vectors), *others]
 
 
 if __name__ == "__main__":

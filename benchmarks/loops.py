@@ -5,12 +5,7 @@ from __future__ import annotations
 from lean_yaw_env.kernel.compilation import borrowed, entry_point
 from lean_yaw_env.kernel.elementary import sine_cosine
 from lean_yaw_env.kernel.records import LANDING, Command, Flight
-from lean_yaw_env.kernel.stance import (
-    accelerations,
-    kinetic_energy,
-    mass_matrix,
-    middle_of_masses,
-)
+from lean_yaw_env.kernel.stance import accelerations, kinetic_energy, mass_matrix, middle_of_masses
 from lean_yaw_env.kernel.step import body_of, finish, stance_of, walking_step, write_outcome
 from lean_yaw_env.kernel.swing import foot_gap
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lean_yaw_env.errors import SolverError
+from lean_yaw_env.extras import is_gpu
 from lean_yaw_env.kernel import records
 from lean_yaw_env.kernel.batch import step_batch as step_batch_kernel
 from lean_yaw_env.kernel.bounds import count_outside
@@ -132,6 +133,7 @@ def step_batch(
     mass_offsets: ArrayLike = 0.0,
     previous_offsets: ArrayLike | None = None,
     threads: int = 1,
+    device: str = "cpu",
 ) -> BatchResult:
     """Step ``n`` walkers once, bit for bit as ``Walker.step`` does one.
 
@@ -145,11 +147,15 @@ def step_batch(
     inter_leg_angles, mass_offsets, previous_offsets : shape (n,) or a number
         See ``Walker.step``; by default the masses are at their offsets already.
     threads : int >= 1
+    device : "cpu" or "cuda"
+        "cuda" steps the walkers on a GPU: experimental, with the extra ``gpu``.
 
     Raises
     ------
     ValueError
         If a shape does not fit, or a number is outside its range, which is that of ``Walker.step``.
+    MissingLibraryError, NoGpuError
+        If ``device`` is "cuda", and the extra ``gpu`` is not installed, or there is no GPU.
     SolverError
         If the integrator gives up on a walker; never for a fall.
     """
@@ -170,12 +176,19 @@ def step_batch(
     if len(bodies) not in (1, n):
         raise ValueError(f"parameters must be of one or {n} walkers, got {len(bodies)}")
     workers = require_count("threads", threads, 1, MOST_THREADS)
-    outcomes = np.empty((n, len(Outcome._fields)))
-    share_out(
-        lambda first, last: step_batch_kernel(bodies, commands, start, side, outcomes, first, last),
-        n,
-        workers,
-    )
+    if is_gpu(device):
+        from lean_yaw_env.kernel import cuda
+
+        outcomes = cuda.step_batch(bodies, commands, start, side)
+    else:
+        outcomes = np.empty((n, len(Outcome._fields)))
+        share_out(
+            lambda first, last: step_batch_kernel(
+                bodies, commands, start, side, outcomes, first, last
+            ),
+            n,
+            workers,
+        )
     result = BatchResult(outcomes)
     for i in np.flatnonzero(result.status == records.FAILED)[:1]:
         body, command = Body(*bodies[i % len(bodies)].tolist()), Command(*commands[i].tolist())

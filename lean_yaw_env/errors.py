@@ -23,5 +23,9 @@ class SolverError(LeanYawError):
     """
 
 
+class NoGpuError(LeanYawError, RuntimeError):
+    """``device="cuda"`` was asked for where no GPU can be used. The default ``device="cpu"`` gives the same results."""
+
+
 class ClusterError(LeanYawError):
     """A scheduler or a worker could not do its part; the message names it. What was done before is kept, where the work has a store."""

@@ -7,6 +7,16 @@ from collections.abc import Iterator
 
 from gymnasium.error import DependencyNotInstalled
 
+from lean_yaw_env.validation import require_choice
+
+DEVICES = ("cpu", "cuda")
+"""Where walkers step; "cuda" needs a GPU and the extra ``gpu``."""
+
+
+def is_gpu(device: str) -> bool:
+    """Whether a device is the GPU; ``ValueError`` if there is no such device."""
+    return require_choice("device", device, DEVICES) == "cuda"
+
 
 class MissingLibraryError(DependencyNotInstalled, ImportError):
     """A library of one of the package's extras is not installed."""

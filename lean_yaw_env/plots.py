@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lean_yaw_env.analysis import LimitCycle, modes
-from lean_yaw_env.parameters import STATE_SIZE
 from lean_yaw_env.passive import PassiveWalker
-from lean_yaw_env.rendering.figures import new_figure
+from lean_yaw_env.rendering.figures import new_figure, panels
 from lean_yaw_env.rendering.palette import (
     FAINT_INK,
     GREEN,
@@ -67,12 +66,7 @@ def gait_figure(cycle: LimitCycle) -> Figure:
     angles, force, plane = figure.subplots(1, 3, width_ratios=(1.3, 1.0, 1.0))
     walker, began = cycle.section_map.walker, 0.0
     for step in cycle.steps:
-        motion = cycle.section_map.stander.stance_motion(
-            step.start[:STATE_SIZE],
-            duration=step.duration,
-            stance=step.foot,
-            **step.command._asdict(),
-        )
+        motion = cycle.stance_motion(step)
         time = began + motion["time"]
         curves = {"stance leg": motion["stance_pitch"], "ankle": motion["ankle_angle"]}
         if isinstance(walker, PassiveWalker):
@@ -100,9 +94,7 @@ def _draw_multipliers(plane: Axes, cycle: LimitCycle) -> None:
     for name, colour in zip(("fore-aft", "three-dimensional"), _COLOURS, strict=False):
         values = [mode.eigenvalue for mode in modes(cycle) if mode.name == name]
         if values:
-            plane.plot(
-                np.real(values), np.imag(values), "o", color=colour, label=name, markersize=6
-            )
+            plane.plot(np.real(values), np.imag(values), "o", color=colour, label=name)
     plane.axhline(0.0, color=_FAINT, linewidth=0.5)
     plane.axvline(0.0, color=_FAINT, linewidth=0.5)
     plane.set_aspect("equal", adjustable="datalim")
@@ -123,13 +115,8 @@ def map_figure(data: xarray.Dataset) -> Figure:
         slices = {
             f"{_name(first)} {values[k]:.4g}": data.isel({first: k}) for k in chosen.astype(int)
         }
-    columns = min(len(slices), 3)
-    rows = -(-len(slices) // columns)
-    figure = new_figure(5.5 * columns + 0.5, 4.2 * rows)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes in panels[len(slices) :]:
-        axes.set_axis_off()
-    for axes, (title, part) in zip(panels, slices.items(), strict=False):
+    figure, places = panels(len(slices), 3, (5.5, 4.2), (0.5, 0.0))
+    for axes, (title, part) in zip(places, slices.items(), strict=True):
         _draw_plane(axes, part, *names[-2:])
         axes.set_title(title, fontsize=10)
     figure.suptitle(

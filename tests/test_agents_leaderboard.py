@@ -15,10 +15,10 @@ from agents import FixedController, RandomController, references
 from agents.command_line import app
 from agents.evaluation import leaderboard, plan
 from agents.evaluation.comparison import (
-    Claim,
+    Hypothesis,
     best_feedback,
-    claims_of,
     compared_rows,
+    hypotheses_of,
     rivals_of,
 )
 from agents.evaluation.episodes import (
@@ -95,10 +95,12 @@ def named(*results: Results) -> dict[str, Results]:
     return {each.agent: each for each in results}
 
 
-def claim(results: dict[str, Results], better: str, worse: str) -> Claim:
-    """That one of these agents of Heading is better than another, with no other claim beside it."""
+def hypothesis(results: dict[str, Results], better: str, worse: str) -> Hypothesis:
+    """That one of these agents of Heading is better than another, with no other hypothesis beside it."""
     rival = {"Heading": worse}
-    return next(each for each in claims_of({"Heading": results}, rival) if each.better == better)
+    return next(
+        each for each in hypotheses_of({"Heading": results}, rival) if each.better == better
+    )
 
 
 SAMPLES = named(
@@ -125,13 +127,13 @@ def test_the_best_feedback_controller_is_neither_the_baseline_nor_the_learned():
 
 
 def test_a_small_difference_on_the_same_episodes_is_seen_through_their_spread():
-    found = claim(named(SAMPLES["ppo"], SAMPLES["lqr"]), "ppo", "lqr")
+    found = hypothesis(named(SAMPLES["ppo"], SAMPLES["lqr"]), "ppo", "lqr")
     # episodes spread by 5, agents differ by 1 on each
     assert found.verdict == "better" and found.p_value < 0.001
     assert found.comparison.mean.low > 0.5
-    assert claim(named(SAMPLES["lqr"], SAMPLES["ppo"]), "lqr", "ppo").verdict == "worse"
+    assert hypothesis(named(SAMPLES["lqr"], SAMPLES["ppo"]), "lqr", "ppo").verdict == "worse"
     twin = replace(SAMPLES["lqr"], agent="fixed")
-    found = claim(named(SAMPLES["lqr"], twin), "fixed", "lqr")
+    found = hypothesis(named(SAMPLES["lqr"], twin), "fixed", "lqr")
     assert found.verdict == "tie" and found.p_value == 1.0
 
 
@@ -144,7 +146,7 @@ def test_of_an_error_less_is_better():
     rows, _ = compared_rows({"Heading": named(low, high)}, {"Heading": "lqr"})
     row = next(row for row in rows if (row.agent, row.metric) == ("fixed", error))
     assert row.difference == pytest.approx(0.2) and direction("Heading", error) == -1
-    assert row.verdict is None  # only the headline is claimed
+    assert row.verdict is None  # only the headline is tested
 
 
 def test_a_mean_and_an_interquartile_mean_that_disagree_are_called_mixed():
@@ -152,22 +154,22 @@ def test_a_mean_and_an_interquartile_mean_that_disagree_are_called_mixed():
     failing = np.full((1, 60), 10.1)
     failing[0, :8] = 0.0  # better in most episodes, and falls in some
     results = named(steady, walked("Heading", "fixed", failing))
-    assert claim(results, "fixed", "lqr").verdict == "mixed"
+    assert hypothesis(results, "fixed", "lqr").verdict == "mixed"
 
 
 def test_an_agent_that_walked_fewer_episodes_is_compared_on_those():
     few = walked("Heading", "feedback", returns(19.0)[:, :20])
-    found = claim(named(SAMPLES["lqr"], few), "feedback", "lqr")
+    found = hypothesis(named(SAMPLES["lqr"], few), "feedback", "lqr")
     assert found.comparison.episodes == 20
     assert found.verdict == "worse"
 
 
-def test_a_few_episodes_make_no_claim_however_clear_they_are():
+def test_a_few_episodes_decide_nothing_however_clear_they_are():
     results = named(
         walked("Heading", "lqr", np.full((1, 4), 10.0)),
         walked("Heading", "mpc", np.full((1, 4), 11.0)),
     )
-    found = claim(results, "mpc", "lqr")
+    found = hypothesis(results, "mpc", "lqr")
     # four equal signs by chance: 2 / 2^4
     assert found.p_value == 0.125 and found.verdict == "tie"
 
@@ -187,23 +189,23 @@ def test_rows_say_against_whom_and_leave_undefined_episodes_uncompared():
     assert rows["lqr", RETURN].against is None
 
 
-def test_claims_are_of_fixed_over_random_and_of_every_agent_over_the_rival():
-    claims = claims_of({"Heading": SAMPLES}, {"Heading": "lqr"})
-    assert [(each.better, each.worse, each.verdict) for each in claims] == [
+def test_hypotheses_are_of_fixed_over_random_and_of_every_agent_over_the_rival():
+    hypotheses = hypotheses_of({"Heading": SAMPLES}, {"Heading": "lqr"})
+    assert [(each.better, each.worse, each.verdict) for each in hypotheses] == [
         ("fixed", "random", "better"), ("random", "lqr", "worse"), ("fixed", "lqr", "worse"),
         ("feedback", "lqr", "worse"), ("ppo", "lqr", "better"),
     ]  # fmt: skip
-    assert claims_of({"Heading": SAMPLES}, {"Heading": None})[0].better == "fixed"
-    assert len(claims_of({"Heading": SAMPLES}, {})) == 1
+    assert hypotheses_of({"Heading": SAMPLES}, {"Heading": None})[0].better == "fixed"
+    assert len(hypotheses_of({"Heading": SAMPLES}, {})) == 1
 
 
-def test_a_claim_needs_a_smaller_p_value_the_more_claims_there_are():
+def test_a_hypothesis_needs_a_smaller_p_value_the_more_hypotheses_there_are():
     noise = np.random.default_rng(3).normal(0.0, 1.0, (1, 60))
     slight = walked("Heading", "feedback", returns(20.0) + 0.3 + noise)
-    alone = claim(named(SAMPLES["lqr"], slight), "feedback", "lqr")
+    alone = hypothesis(named(SAMPLES["lqr"], slight), "feedback", "lqr")
     assert alone.holds and alone.p_value == alone.comparison.p_value > 0.001
     twins = [replace(slight, agent=f"twin{k}") for k in range(40)]
-    among = claim(named(SAMPLES["lqr"], slight, *twins), "feedback", "lqr")
+    among = hypothesis(named(SAMPLES["lqr"], slight, *twins), "feedback", "lqr")
     assert among.comparison == alone.comparison
     assert among.p_value == pytest.approx(min(41 * alone.p_value, 1.0))
     assert among.verdict == "tie"
@@ -337,21 +339,21 @@ def fallen(agent: str, mean: float, episodes: int = 60, trainings: int = 1) -> R
 
 def test_who_falls_less_often_is_better_however_few_fall():
     results = {ENDLESS: named(*(fallen(*each) for each in (("lqr", 50.0), ("ppo", 200.0), ("sac", np.inf))))}  # fmt: skip
-    claims = {each.better: each for each in claims_of(results, {ENDLESS: "lqr"})}
-    assert claims["ppo"].holds and claims["sac"].holds
-    assert claims["ppo"].comparison.mean.value == pytest.approx(np.log10(4.0), abs=0.2)
-    assert np.isfinite(claims["sac"].comparison.mean).all()
+    hypotheses = {each.better: each for each in hypotheses_of(results, {ENDLESS: "lqr"})}
+    assert hypotheses["ppo"].holds and hypotheses["sac"].holds
+    assert hypotheses["ppo"].comparison.mean.value == pytest.approx(np.log10(4.0), abs=0.2)
+    assert np.isfinite(hypotheses["sac"].comparison.mean).all()
     few = {ENDLESS: named(fallen("lqr", 5000.0), fallen("ppo", np.inf))}
     fell = few[ENDLESS]["lqr"].values(FELL).sum()
     assert 0 < fell < 5  # too few to say anything
-    assert claims_of(few, {ENDLESS: "lqr"})[0].verdict == "tie"
+    assert hypotheses_of(few, {ENDLESS: "lqr"})[0].verdict == "tie"
     assert best_feedback(named(fallen("lqr", 50.0), fallen("feedback", 20.0))) == "lqr"
 
 
 def test_an_agent_that_never_falls_has_a_bound_and_no_infinity_anywhere(tmp_path):
     results = {ENDLESS: named(fallen("lqr", 50.0), fallen("ppo", np.inf, trainings=2))}
-    rows, claims = compared_rows(results, {ENDLESS: "lqr"})
-    page = leaderboard_page(rows, claims, {0.5: rows[:1]}, {}, "Made by a test.")
+    rows, hypotheses = compared_rows(results, {ENDLESS: "lqr"})
+    page = leaderboard_page(rows, hypotheses, {0.5: rows[:1]}, {}, "Made by a test.")
     bound = np.log10(2 * 60 * 100.0 / -np.log(0.025))
     assert f"| ≥ {bound:.3f} |" in page and "log10 time per fall ↑" in page
     text = rows_to_csv(rows)
@@ -436,12 +438,12 @@ def test_a_page_says_plainly_what_does_not_hold():
         walked("Heading", "ppo", returns(20.0, trainings=2) - 0.001),
         walked("Heading", "sac", returns(15.0, trainings=2)),
     )
-    rows, claims = compared_rows({"Heading": results}, {"Heading": "lqr"})
-    page = leaderboard_page(rows, claims, {}, {}, "Made by a test.")
+    rows, hypotheses = compared_rows({"Heading": results}, {"Heading": "lqr"})
+    page = leaderboard_page(rows, hypotheses, {}, {}, "Made by a test.")
     assert "no: no significant difference from lqr" in page
     assert "no: sac is worse than lqr" in page
     assert "**ppo** is better than the best feedback controller on no task" in page
-    assert "The correction is for 2 claims" in page
+    assert "The correction is for 2 comparisons" in page
 
 
 def test_a_page_says_whether_the_best_agent_leaves_room_to_win(monkeypatch):
@@ -455,19 +457,19 @@ def test_a_page_says_whether_the_best_agent_leaves_room_to_win(monkeypatch):
         task: named(walked(task, "fixed", np.full((1, 9), 10.0)), walked(task, "lqr", np.full((1, 9), 20.0)))
         for task in ("Heading", "Level", "Slalom", "Walk")
     }  # fmt: skip
-    rows, claims = compared_rows(results, {})
+    rows, hypotheses = compared_rows(results, {})
     rows = [leaderboard._normalised(row) for row in rows]
     assert {row.normalised for row in rows if (row.task, row.metric) == ("Heading", RETURN)} == {0.0, 0.5}  # fmt: skip
-    page = leaderboard_page(rows, claims, {}, {}, "Made by a test.")
+    page = leaderboard_page(rows, hypotheses, {}, {}, "Made by a test.")
     assert "30.0 (a search) | lqr | 20.0 [20.0, 20.0] | 0.50 | yes |" in page
     assert "| 0.91 | **no: nearly solved** |" in page
     assert "not known: no reference" in page
     assert "**A smoke test: it ranks no agent.**" in page and "| Walk | return" not in page
 
 
-def test_a_task_that_ranks_nobody_makes_no_claims():
+def test_a_task_that_ranks_nobody_has_no_hypotheses():
     of_walk = named(*(walked("Walk", name, returns(k)) for k, name in enumerate(("random", "fixed", "lqr"))))  # fmt: skip
-    assert claims_of({"Walk": of_walk}, {"Walk": "lqr"}) == []
+    assert hypotheses_of({"Walk": of_walk}, {"Walk": "lqr"}) == []
 
 
 def test_the_rival_is_chosen_on_validation_and_only_the_leaderboard_reads_the_test(

@@ -11,7 +11,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from benchmarks import environments, kernel, startup, training
+from benchmarks import environments, infos, kernel, startup, training
 from benchmarks.compare import as_text as comparison_text
 from benchmarks.compare import compare, save_plot
 from benchmarks.measure import (
@@ -35,7 +35,7 @@ KERNEL_KEYS = {
 }
 
 
-@pytest.mark.parametrize("benchmark", [kernel, environments, startup, training])
+@pytest.mark.parametrize("benchmark", [kernel, environments, infos, startup, training])
 def test_a_benchmark_runs_at_its_smallest_and_names_each_measurement_once(
     benchmark: ModuleType,
 ) -> None:

@@ -10,6 +10,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -67,7 +68,7 @@ threading.Thread(target=close_windows, daemon=True).start()
     },
 }
 """Modules in place of clusters and of a person who closes a window; ``stand_in`` is imported first."""
-BLOCK = re.compile(r"^```(.*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+BLOCK = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 PROGRAMS = re.compile(r"(pip|python|pytest|lean-yaw|npm|dask) ")
 PYTHON_BLOCK = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 FENCED = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
@@ -241,9 +242,14 @@ def test_results_in_the_readme_are_those_of_the_leaderboard() -> None:
             assert cell == (f"**{text}**" if bold else text), (task, agent)
 
 
+def _measured(benchmark: str) -> dict[str, Any]:
+    path = ROOT / "benchmarks" / "results" / f"{benchmark}.json"
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
 def test_speeds_in_the_readme_are_those_measured() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    kept = json.loads((ROOT / "benchmarks/results/full.json").read_text(encoding="utf-8"))
+    kept = {**_measured("kernel"), **_measured("environments"), **_measured("training")}
     million = 1e-6
     ppo = kept["training_collecting"] + kept["training_update"]
     for part in (
@@ -257,3 +263,23 @@ def test_speeds_in_the_readme_are_those_measured() -> None:
         f"{ppo:.0f} µs per step, of which the gradient updates take {kept['training_update']:.0f} µs",
     ):
         assert part in text
+
+
+def test_times_of_the_first_step_are_those_measured() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    kept = _measured("startup")
+    for part in (
+        f"about {kept['cold_start']:.0f} seconds of processor time",
+        f"another task adds about {max(kept['another_task'], 0.1):.1g}",
+        f"the first vector environment about {kept['first_vector']:.0f}",
+        f"load the compiled code from disk, in {kept['warm_start']:.1f} seconds",
+        f"everything beforehand, in about {round(kept['compile_everything'], -1):.0f} seconds",
+    ):
+        assert part in text
+
+
+def test_the_cost_of_infos_is_that_measured() -> None:
+    text = (DOCS / "environments.md").read_text(encoding="utf-8")
+    costs = {n: _measured("infos")[f"infos_{n}_cost"] for n in (16, 64, 1024, 4096)}
+    shares = [f"{costs[n]:.0f} % with {n:,}" for n in costs]
+    assert f"{', '.join(shares[:-1])} and {shares[-1]} walkers" in text

@@ -1,9 +1,11 @@
-"""The wheel: what it installs, and that its agents work beside another distribution that installs the name ``agents``."""
+"""The wheel: what it installs, what a package index shows of it, and that its agents work beside another distribution of the name ``agents``."""
 
 from __future__ import annotations
 
 import json
 import os
+import re
+import runpy
 import subprocess
 import sys
 import zipfile
@@ -73,6 +75,39 @@ def test_the_wheel_installs_no_name_but_the_package_s(wheel: Path):
     assert shipped and {f"lean_yaw_env/{path}" for path in shipped} <= set(names)
     assert "lean_yaw_env/agents/settings.json" in names
     assert not [name for name in names if "__pycache__" in name]
+
+
+def test_checkers_of_distributions_find_nothing(wheel: Path, tmp_path: Path):
+    pytest.importorskip("twine")
+    pytest.importorskip("check_wheel_contents")
+    built = run(sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", tmp_path, cwd=ROOT)
+    assert built.returncode == 0, built.stderr
+    (sdist,) = tmp_path.glob("*.tar.gz")
+    for checker in (["twine", "check", "--strict", wheel, sdist], ["check_wheel_contents", wheel]):
+        done = run(sys.executable, "-m", *checker)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_links_on_a_package_index_lead_to_the_repository_s_address_or_nowhere(wheel: Path):
+    with zipfile.ZipFile(wheel) as file:
+        (metadata,) = (name for name in file.namelist() if name.endswith("/METADATA"))
+        page = file.read(metadata).decode()
+    link = re.compile(r"(!?)\[[^\]]*\]\(([^)]+)\)")
+    targets = [target for _, target in link.findall(page)]
+    assert targets
+    assert all(target.startswith(("https://", "#")) for target in targets)
+    # with an address
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    page_of_index = runpy.run_path(str(ROOT / "hatch_build.py"))["page_of_index"]
+    address = "https://example.org/walkers"
+    images, pages = set(), set()
+    for image, target in link.findall(page_of_index(readme, address)):
+        assert target.startswith(("https://", "#"))
+        if target.startswith(address):
+            (images if image else pages).add(target.partition("#")[0])
+    files = {f"{address}/raw/main/{path}" for path in ("docs/images/walking.webp", "benchmarks/results/comparison.png")}  # fmt: skip
+    assert images == files
+    assert f"{address}/blob/main/docs/environments.md" in pages
 
 
 def test_an_installed_wheel_loads_policies_and_runs_baselines(python: Path, tmp_path: Path):

@@ -115,8 +115,11 @@ def test_what_the_page_cannot_show_is_refused(tmp_path):
         PageServer(task="Slalom", agents=["her"])
     with pytest.raises(ValueError, match="give task too"):
         PageServer(agents=["ppo"])
-    with pytest.raises(FileNotFoundError, match="no policy.json in"):
-        PageServer(policy=tmp_path)
+    with pytest.raises(FileNotFoundError, match=r"no policy\.json in"):
+        PageServer(policy=tmp_path, task="Slalom")
+    agents.save(agents.load("LeanYaw/Slalom-v1"), tmp_path)
+    with pytest.raises(ValueError, match="is for Slalom, and task is 'Walk'"):
+        PageServer(policy=tmp_path, task="Walk")
     agents.save(agents.load("LeanYaw/WaypointGoal-v1"), tmp_path)
     with pytest.raises(ValueError, match="is for LeanYaw/WaypointGoal-v1"):
         PageServer(policy=tmp_path)
@@ -127,17 +130,25 @@ def test_what_the_page_cannot_show_is_refused(tmp_path):
 def test_page_written_for_a_static_host_has_its_agents_beside_it(tmp_path):
     write_page(tmp_path)
     for file in PAGE.rglob("*"):
-        assert file.is_dir() or (tmp_path / file.relative_to(PAGE)).read_bytes() == file.read_bytes()
+        assert (
+            file.is_dir() or (tmp_path / file.relative_to(PAGE)).read_bytes() == file.read_bytes()
+        )
     index = json.loads((tmp_path / "agents" / "index.json").read_text())
     for task, offered in index["agents"].items():
         for algorithm, entry in offered.items():
             for seed in entry["seeds"]:
-                assert (tmp_path / "agents" / task / algorithm / f"seed{seed}" / "policy.json").exists()
+                assert (
+                    tmp_path / "agents" / task / algorithm / f"seed{seed}" / "policy.json"
+                ).exists()
 
 
 def test_page_loads_in_less_than_a_megabyte():
     """Compressed, as hosts send it, and without agents, which are read when they are asked for."""
-    sizes = {file.name: len(gzip.compress(file.read_bytes())) for file in PAGE.rglob("*") if file.is_file()}
+    sizes = {
+        file.name: len(gzip.compress(file.read_bytes()))
+        for file in PAGE.rglob("*")
+        if file.is_file()
+    }
     assert sum(sizes.values()) < 1_000_000, sizes
 
 

@@ -100,11 +100,13 @@ def test_episodes_have_the_packages_observations_and_rewards(page, task):
     keys = rng.integers(0, 2**64, n, dtype=np.uint64).tolist()
     pump = json.loads(build_kernel.TASKS.read_text())["tasks"][task]["pump"]
     actions = rng.uniform(-1.0, 1.0, (STEPS, n, 2)) * rng.uniform(0.05, 0.5, (1, n, 1))
-    actions = np.clip(actions + [0.0, pump], -1.0, 1.0).astype(np.float32)
+    actions = np.clip(actions + np.array([0.0, pump]), -1.0, 1.0).astype(np.float32)
     expected, ours = in_the_package(task, keys, actions), on_the_page(page, task, keys, actions)
     assert len(expected) > 1500
     assert np.array_equal(ours[:, ENDS], expected[:, ENDS])
-    np.testing.assert_allclose(ours[:, REWARDS], expected[:, REWARDS], rtol=0.0, atol=1e-3 if task == "Hills" else REWARD)
+    np.testing.assert_allclose(
+        ours[:, REWARDS], expected[:, REWARDS], rtol=0.0, atol=1e-3 if task == "Hills" else REWARD
+    )
     if task != "Hills":
         assert np.array_equal(ours[:, SEEN], expected[:, SEEN])
         return
@@ -243,6 +245,7 @@ def test_a_policy_of_ones_own_walks_its_task(page, tmp_path):
         own = page.context.browser.new_page()
         own.set_default_timeout(PATIENCE)
         own.goto(f"{server.address}&quality=4")
+        own.wait_for_selector("html[data-ready=true]")
         own.wait_for_selector("#scores tbody tr")
         own.keyboard.press("p")
         steps(own, 10)

@@ -47,10 +47,7 @@ class LinearLaw(MemorylessController):
     """
 
     def __init__(
-        self,
-        task: str,
-        options: EnvOptions | None = None,
-        settings: LinearSettings | None = None,
+        self, task: str, options: EnvOptions | None = None, settings: LinearSettings | None = None
     ) -> None:
         chosen = EnvOptions() if options is None else options
         own = tuned("linear", task, LinearSettings()) if settings is None else settings

@@ -22,13 +22,14 @@ from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.files import write_text
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, STATE_SIZE, Vector
 from lean_yaw_env.rendering.figures import panels, save_figure
+from lean_yaw_env.tables import csv_table
 from lean_yaw_env.validation import require_count
 from lean_yaw_env.walker import Walker
 
 from ..agent import Agent
 from .closed_loop_interface import closed_loop
 from .closed_loop_report import axes_around_start, box_starts
-from .row_tables import IMAGES, csv_table
+from .row_tables import IMAGES
 
 MOST_STEPS, SETTLE_STEPS = 2, 60
 """Chosen steps of the exhaustive search, and steps that the paper's controller then walks; an agent walks as many in all."""

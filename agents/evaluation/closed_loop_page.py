@@ -13,11 +13,12 @@ from rich.table import Table
 
 from lean_yaw_env.analysis import Mode
 from lean_yaw_env.files import write_text
+from lean_yaw_env.tables import csv_table, markdown_table
 
 from .closed_loop_interface import GOAL_AHEAD
 from .closed_loop_pictures import save_basins, save_eigenvalues, save_pushes
 from .closed_loop_report import LINES, REACHES, STEPS, ZERO, Cell, ClosedLoopReport
-from .row_tables import IMAGES, csv_table, markdown_table
+from .row_tables import IMAGES
 
 _HEAD = """# Walker and agent as one system
 

@@ -1,4 +1,4 @@
-"""Which agent is better: comparisons on the same episodes, and claims whose p-values are corrected for how many there are."""
+"""Which agent is better: comparisons on the same episodes, and hypotheses whose p-values are corrected for how many there are."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def compare(first: Results, second: Results, metric: str) -> Comparison:
 
 
 @dataclass(frozen=True)
-class Claim:
+class Hypothesis:
     """That one agent is better than another at a task, by the mean of its headline, which counts every fall."""
 
     task: str
@@ -89,7 +89,7 @@ class Claim:
     worse: str
     comparison: Comparison
     p_value: float
-    """Corrected for the number of claims."""
+    """Corrected for the number of hypotheses."""
 
     @property
     def verdict(self) -> Verdict:
@@ -108,10 +108,10 @@ class Claim:
         return self.verdict == "better"
 
 
-def claims_of(
+def hypotheses_of(
     results: Mapping[str, ResultsByAgent], rivals: Rivals, threads: int = 1
-) -> list[Claim]:
-    """Every claim: the fixed controller against random actions, and every other agent against its task's rival, as the better one; none of tasks that
+) -> list[Hypothesis]:
+    """Every hypothesis: the fixed controller against random actions, and every other agent against its task's rival, as the better one; none of tasks that
     rank nobody.
 
     numpy's loops let threads share the comparisons.
@@ -134,35 +134,35 @@ def claims_of(
         comparisons = list(pool.map(compared, pairs))
     corrected = holm([each.p_value for each in comparisons])
     return [
-        Claim(*pair, comparison, p_value)
+        Hypothesis(*pair, comparison, p_value)
         for pair, comparison, p_value in zip(pairs, comparisons, corrected, strict=True)
     ]
 
 
 def compared_rows(
     results: Mapping[str, ResultsByAgent], rivals: Rivals, threads: int = 1
-) -> tuple[list[Row], list[Claim]]:
-    """A row for each metric of each agent, compared with the task's rival where there is one; and the claims.
+) -> tuple[list[Row], list[Hypothesis]]:
+    """A row for each metric of each agent, compared with the task's rival where there is one; and the hypotheses.
 
     What some episodes leave undefined, as the time to settle of an agent that never settles, is no ground to compare on.
     """
-    claims = claims_of(results, rivals, threads)
+    hypotheses = hypotheses_of(results, rivals, threads)
     against = {
-        (each.task, each.better): each for each in claims if each.worse == rivals.get(each.task)
+        (each.task, each.better): each for each in hypotheses if each.worse == rivals.get(each.task)
     }
     everything = [each for of_task in results.values() for each in of_task.values()]
 
     def rows_of(mine: Results) -> list[Row]:
         rival = results[mine.task].get(rivals.get(mine.task) or "")
         rows = [_compared(metric_row(mine, metric), mine, rival) for metric in mine.metrics]
-        claim, headline = against.get((mine.task, mine.agent)), task_named(mine.task).headline
-        if claim is None:
+        hypothesis, headline = against.get((mine.task, mine.agent)), task_named(mine.task).headline
+        if hypothesis is None:
             return rows
-        found = {"p_value": claim.p_value, "verdict": claim.verdict}
+        found = {"p_value": hypothesis.p_value, "verdict": hypothesis.verdict}
         return [replace(row, **found) if row.metric == headline else row for row in rows]
 
     with ThreadPoolExecutor(threads) as pool:
-        return [row for rows in pool.map(rows_of, everything) for row in rows], claims
+        return [row for rows in pool.map(rows_of, everything) for row in rows], hypotheses
 
 
 def _compared(row: Row, mine: Results, rival: Results | None) -> Row:

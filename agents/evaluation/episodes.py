@@ -15,7 +15,7 @@ from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.parameters import Vector
 
 from .intervals import (
-    CLAIM_RESAMPLES,
+    HYPOTHESIS_RESAMPLES,
     RESAMPLES,
     UNDEFINED,
     Resampled,
@@ -108,8 +108,8 @@ class Results:
         if (metric, count) not in self._resampled:
             # an agent's trainings are drawn by themselves, alike whoever else is evaluated
             stream = zlib.crc32(self.agent.encode())
-            is_claimed = metric == task_named(self.task).headline
-            resamples = CLAIM_RESAMPLES if is_claimed else RESAMPLES
+            is_tested = metric == task_named(self.task).headline
+            resamples = HYPOTHESIS_RESAMPLES if is_tested else RESAMPLES
             if metric == TIME_PER_FALL:
                 drawn = resample_time_per_fall(*self.falls(count), stream, resamples)
             else:
@@ -134,9 +134,9 @@ class Row:
     least_training, greatest_training : the lowest and the highest mean of a training, of those that have one
     against : the feedback controller that it is compared with, on the episodes that both have walked
     difference, difference_low, difference_high : the mean less that agent's, with its 95 % interval; NaN where there is no comparison
-    p_value : of the difference being zero, of the task's headline only; corrected for the number of claims (Holm)
+    p_value : of the difference being zero, of the task's headline only; corrected for the number of hypotheses (Holm)
     normalised : on the leaderboard, the headline's mean (or what it is at least) where 0 is the fixed controller's and 1 the reference's
-    verdict : "better", "worse", "tie" or "mixed", by that p-value: see ``comparison.Claim``
+    verdict : "better", "worse", "tie" or "mixed", by that p-value: see ``comparison.Hypothesis``
     """
 
     task: str

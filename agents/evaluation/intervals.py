@@ -25,8 +25,8 @@ from lean_yaw_env.parameters import Vector
 
 CONFIDENCE = 0.95
 RESAMPLES = 2000
-CLAIM_RESAMPLES = 10_000
-"""Of what is claimed: the smallest p-value is 2 / (CLAIM_RESAMPLES + 1), and Holm's first limit is 0.05 over the number of claims."""
+HYPOTHESIS_RESAMPLES = 10_000
+"""Of what is tested: the smallest p-value is 2 / (HYPOTHESIS_RESAMPLES + 1), and Holm's first limit is 0.05 over the number of hypotheses."""
 _BLOCK = 500_000  # values drawn at a time: some megabytes
 _QUARTER = 0.25
 
@@ -169,10 +169,7 @@ def _draws(shape: tuple[int, ...], stream: int, resamples: int) -> Iterator[tupl
     most = max(1, _BLOCK // (trainings * episodes))
     for start in range(0, resamples, most):
         n = min(most, resamples - start)
-        yield (
-            _counts(generators[0], n, trainings),
-            _counts(generators[1], n, episodes),
-        )
+        yield (_counts(generators[0], n, trainings), _counts(generators[1], n, episodes))
 
 
 def _counts(generator: np.random.Generator, n: int, size: int) -> Vector:

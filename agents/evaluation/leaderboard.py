@@ -15,6 +15,7 @@ from tqdm import tqdm
 
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.files import write_text
+from lean_yaw_env.tables import csv_table, markdown_table
 from lean_yaw_env.validation import require_count
 
 from ..agent import Agent
@@ -23,9 +24,9 @@ from ..references import normalised, references
 from ..registry import AGENTS
 from ..seeds import first_seed
 from .capture import MOST_STEPS, CaptureReport, examine_capture, picture_name, save_captures
-from .comparison import ENTERED, Claim, by_task, compared_rows, kind_of, rivals_of
+from .comparison import ENTERED, Hypothesis, by_task, compared_rows, kind_of, rivals_of
 from .episodes import SURVIVAL, TIME_PER_FALL, Results, Row, direction, is_share, metric_row, words
-from .intervals import CLAIM_RESAMPLES, CONFIDENCE, RESAMPLES
+from .intervals import CONFIDENCE, HYPOTHESIS_RESAMPLES, RESAMPLES
 from .pictures import save_agents_footprints, save_leaderboard_plot, save_push_levels_plot
 from .plan import (
     LONG_COSTLY_EPISODES,
@@ -36,17 +37,7 @@ from .plan import (
     make_candidate,
 )
 from .robustness import collapses
-from .row_tables import (
-    IMAGES,
-    bracketed,
-    csv_table,
-    iqm,
-    markdown_table,
-    mean,
-    number,
-    rows_to_csv,
-    rows_to_plain,
-)
+from .row_tables import IMAGES, bracketed, iqm, mean, number, rows_to_csv, rows_to_plain
 
 LEVELS_TASK, LEVELS = "Metastable", (0.5, 0.7, 1.0)
 """What is evaluated at other push levels than its own too."""
@@ -62,7 +53,7 @@ agent was trained several times, its trainings (those of the package) are pooled
 - The first number of each agent is the **mean** of the task's main metric, which counts every fall. Beside it stands **survival**, the share of
   episodes that the time limit or a success ended, and the **iqm**, the interquartile mean: the mean of the middle half of all episodes, which does not show
   what happens in fewer than a quarter of them. Errors are averaged over the time before a fall; the error of an agent that often falls means little.
-- Brackets contain {confidence:.0%} confidence intervals: bootstrap intervals ({resamples:,} resamples, {claim_resamples:,} of main metrics) for means,
+- Brackets contain {confidence:.0%} confidence intervals: bootstrap intervals ({resamples:,} resamples, {hypothesis_resamples:,} of main metrics) for means,
   Wilson intervals for shares. The bootstrap resamples the episodes and, if there are several, the trainings. Such an interval is valid for another
   training on other episodes.
 - **log10 time per fall** is the time of all walks over their number of falls, as a power of ten. Walks are cut after {horizon:,.0f} time units; a walk that
@@ -70,8 +61,8 @@ agent was trained several times, its trainings (those of the package) are pooled
   falls has a lower bound (≥) only. A comparison of two agents counts half a fall for an agent without one, and its p-value is the larger one of the
   bootstrap's and that of the exact test of equal rates.
 - **against** compares the mean of the main metric with that of the best feedback controller on the same episodes. Which controller that is was
-  decided on the validation episodes, before the test episodes were read. "Better" and "worse" are claims whose p-values, corrected for the number of
-  all claims on this page by Holm's method, are below 0.05.
+  decided on the validation episodes, before the test episodes were read. "Better" and "worse" mean that the p-value, corrected for the number of
+  all comparisons on this page by Holm's method, is below 0.05.
 - **normalised** is the main metric's mean where 0 is the fixed controller's and 1 the reference's, the best result known (see below).
 - **saves** is the share of disturbed starts that the agent saves, of those that an exhaustive search over {chosen_steps} chosen steps can save
   (see [findings](findings.md#what-learned-policies-save)); of the first of several trainings. Planners, agents that remember
@@ -86,7 +77,7 @@ _ANSWERS = """\
 | Slalom, Walk and Push were saturated, Heading nearly. | Slalom has stronger pushes. Metastable replaces Push: it measures the time to a fall. Walk ranks no agent. The table of what is left to win shows Heading as it is: the entry level. |
 | The headline was survival of 200 steps, and the interquartile mean hid falls. | The mean, which counts every fall, stands first, and survival beside it. All limits are times. |
 | Hidden bodies measured robustness, not adaptation. | The bodies of UnknownBody are twice as different, and its oracle shows what knowing the body is worth. |
-| Agents were chosen on the episodes of the leaderboard, and claims were not corrected. | Training, validation and test episodes are different by construction. Rivals are fixed before the test episodes are read. Holm's method corrects all claims, and intervals resample trainings too. |
+| Agents were chosen on the episodes of the leaderboard, and p-values were not corrected. | Training, validation and test episodes are different by construction. Rivals are fixed before the test episodes are read. Holm's method corrects all hypotheses, and intervals resample trainings too. |
 | mpc was a weak yardstick where its base was weak. | mpc plans around ppo, and references come from a search that sees the future. |"""
 
 Levels = Mapping[float, Sequence[Row]]
@@ -137,7 +128,7 @@ def make_leaderboard(
     made = {each: make_candidate(each, each.folders[0], evaluation.seed) for each in candidates}
     own = found[: len(candidates)]
     results = by_task([*own, *others])
-    rows, claims = compared_rows(results, rivals, evaluation.processes)
+    rows, hypotheses = compared_rows(results, rivals, evaluation.processes)
     rows = [_normalised(row) for row in rows]
     levels = level_rows(found)
     images = out / IMAGES
@@ -165,7 +156,7 @@ def make_leaderboard(
             )
     save_captures(captures, images)
     saved = {(each.task, each.agent): each.share() for each in captures}
-    page = leaderboard_page(rows, claims, levels, saved, origin, out / "robustness.csv")
+    page = leaderboard_page(rows, hypotheses, levels, saved, origin, out / "robustness.csv")
     write_text(out / "leaderboard.md", page)
     return rows, own
 
@@ -232,14 +223,14 @@ def _levels_to_csv(levels: Levels) -> str:
 
 def leaderboard_page(
     rows: Sequence[Row],
-    claims: Sequence[Claim],
+    hypotheses: Sequence[Hypothesis],
     levels: Levels,
     saved: Saved,
     made: str,
     robustness: Path | None = None,
 ) -> str:
     """The whole page; ``made`` says how it was made. ``robustness`` is the file that ``python -m agents robustness`` wrote, if it is there."""
-    reading = _READING.format(confidence=CONFIDENCE, resamples=RESAMPLES, claim_resamples=CLAIM_RESAMPLES, chosen_steps=MOST_STEPS, horizon=LONG_HORIZON)  # fmt: skip
+    reading = _READING.format(confidence=CONFIDENCE, resamples=RESAMPLES, hypothesis_resamples=HYPOTHESIS_RESAMPLES, chosen_steps=MOST_STEPS, horizon=LONG_HORIZON)  # fmt: skip
     parts = [
         "# Leaderboard",
         made,
@@ -252,7 +243,7 @@ def leaderboard_page(
         "## What version 1 answers",
         _ANSWERS,
         "## Comparisons",
-        *_comparisons(claims),
+        *_comparisons(hypotheses),
     ]
     for task in dict.fromkeys(row.task for row in rows):
         parts += [
@@ -323,13 +314,13 @@ def _sees_what_all_see(agent: str) -> bool:
     return kind_of(agent) != "planner" and not (agent in AGENTS and AGENTS[agent].options)
 
 
-def _comparisons(claims: Sequence[Claim]) -> list[str]:
+def _comparisons(hypotheses: Sequence[Hypothesis]) -> list[str]:
     titles = ["task", "main metric", "comparison", "holds", "corrected p", "difference of means", "difference of iqm"]  # fmt: skip
-    expected = [each for each in claims if _is_expected(each)]
+    expected = [each for each in hypotheses if _is_expected(each)]
     lines = [
         'Each comparison uses the mean of the task\'s main metric. "A < B" holds if B is better with a corrected p-value below 0.05. '
-        f"The correction is for {len(claims)} claims: these and the comparisons of the remaining agents with the best feedback controller.",
-        markdown_table(titles, [_claim_row(each) for each in expected]),
+        f"The correction is for {len(hypotheses)} comparisons: these and those of the remaining agents with the best feedback controller.",
+        markdown_table(titles, [_hypothesis_row(each) for each in expected]),
     ]
     names = dict.fromkeys(each.better for each in expected)
     for name in (each for each in names if kind_of(each) in _RANKED):
@@ -343,26 +334,33 @@ def _comparisons(claims: Sequence[Claim]) -> list[str]:
     return lines
 
 
-def _is_expected(claim: Claim) -> bool:
+def _is_expected(hypothesis: Hypothesis) -> bool:
     """Whether the better one is expected to be: not another feedback controller, nor a baseline against a feedback controller."""
-    return kind_of(claim.better) in _RANKED or claim.worse == "random"
+    return kind_of(hypothesis.better) in _RANKED or hypothesis.worse == "random"
 
 
-def _claim_row(claim: Claim) -> list[str]:
-    headline = words(task_named(claim.task).headline)
-    holds = "yes" if claim.holds else f"no: {_why_not(claim)}"
-    differences = (bracketed(each, signed=True) for each in claim.comparison[:2])
-    p_value = f"{claim.p_value:.2g}"
-    return [claim.task, headline, f"{claim.worse} < {claim.better}", holds, p_value, *differences]
+def _hypothesis_row(hypothesis: Hypothesis) -> list[str]:
+    headline = words(task_named(hypothesis.task).headline)
+    holds = "yes" if hypothesis.holds else f"no: {_why_not(hypothesis)}"
+    differences = (bracketed(each, signed=True) for each in hypothesis.comparison[:2])
+    p_value = f"{hypothesis.p_value:.2g}"
+    return [
+        hypothesis.task,
+        headline,
+        f"{hypothesis.worse} < {hypothesis.better}",
+        holds,
+        p_value,
+        *differences,
+    ]
 
 
-def _why_not(claim: Claim) -> str:
+def _why_not(hypothesis: Hypothesis) -> str:
     words = {
-        "worse": f"{claim.better} is worse than {claim.worse}",
-        "tie": f"no significant difference from {claim.worse}",
+        "worse": f"{hypothesis.better} is worse than {hypothesis.worse}",
+        "tie": f"no significant difference from {hypothesis.worse}",
         "mixed": "mean and iqm disagree",
     }
-    return words[claim.verdict]
+    return words[hypothesis.verdict]
 
 
 def _task_table(task: str, rows: Sequence[Row], saved: Saved) -> str:

@@ -30,14 +30,7 @@ from lean_yaw_env.validation import require_count
 from ..agent import Agent
 from ..policies.policy import package_versions
 from ..policies.policy_files import CARD_FILE, WEIGHTS_FILE, load, options_to_plain
-from ..registry import (
-    AgentRequest,
-    agent_entry,
-    env_id_of,
-    make_agent,
-    names_for,
-    policy_folders,
-)
+from ..registry import AgentRequest, agent_entry, env_id_of, make_agent, names_for, policy_folders
 from ..seeds import MOST_EPISODES, EpisodeSet, first_seed
 from .comparison import kind_of
 from .entries import is_entry, load_entry, read_entry

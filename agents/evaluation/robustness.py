@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -16,12 +15,13 @@ from lean_yaw_env.envs.options import EnvOptions, TaskOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.files import write_text
 from lean_yaw_env.rendering.figures import panels, save_figure
+from lean_yaw_env.tables import csv_table, markdown_table, read_csv
 
 from ..policies.policy_files import options_to_plain
 from .comparison import kind_of
 from .episodes import TIME_PER_FALL, Row, metric_row, words
 from .plan import Candidate, Evaluation
-from .row_tables import IMAGES, bracketed, csv_table, markdown_table, mean, number, plain_number
+from .row_tables import IMAGES, bracketed, mean, number, plain_number
 
 NOMINAL = "as it is"
 VARIATIONS: dict[str, Callable[[TaskOptions], Mapping[str, Any]]] = {
@@ -126,8 +126,7 @@ def robustness_csv(rows: Sequence[VariedRow]) -> str:
 def collapses(file: Path) -> list[list[str]]:
     """Of a ``robustness.csv``, a line for each task and agent that some variation costs more than half of its mean, or 90 % of its time to a fall: task,
     agent, mean in the task as it is, and those variations with their means, the worst first."""
-    with file.open(newline="", encoding="utf-8") as text:
-        rows = list(csv.DictReader(text))
+    rows = read_csv(file)
     # of a time per fall without a fall there is its lower bound alone
     scores = {(row["task"], row["agent"], row["variation"]): float(row["mean"] or row["low"]) for row in rows}  # fmt: skip
     found: list[list[str]] = []

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from typing import TypeVar
 
@@ -15,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from lean_yaw_env.envs.tasks import task_named
+from lean_yaw_env.tables import csv_table
 
 from .episodes import SURVIVAL, Row, words
 from .intervals import Estimate
@@ -114,21 +113,6 @@ def bracketed(found: Estimate, *, signed: bool = False) -> str:
 def number(value: float) -> str:
     """As many digits as intervals of some thousand episodes leave."""
     return f"{value:.1f}" if abs(value) >= 10.0 else f"{value:.3f}"
-
-
-def markdown_table(
-    titles: Sequence[str], lines: Sequence[Sequence[str]], *, align_right: bool = False
-) -> str:
-    """A table in Markdown, all columns but the first aligned to the right if asked for."""
-    rule = ["---", *(["---:" if align_right else "---"] * (len(titles) - 1))]
-    return "\n".join("| " + " | ".join(line) + " |" for line in (titles, rule, *lines))
-
-
-def csv_table(titles: Sequence[str], lines: Iterable[Iterable[object]]) -> str:
-    """A table as CSV; None is empty."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([titles, *lines])
-    return text.getvalue()
 
 
 def show(rows: Sequence[Row], console: Console, *, as_json: bool = False) -> None:

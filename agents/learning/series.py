@@ -23,6 +23,7 @@ from lean_yaw_env.errors import LeanYawError
 from lean_yaw_env.files import locked, read_json, write_json, write_text
 from lean_yaw_env.registration import ALL_ENV_IDS
 from lean_yaw_env.reporting import uninterrupted
+from lean_yaw_env.tables import csv_table
 from lean_yaw_env.validation import require_choice, require_count
 
 from ..evaluation.episodes import RETURN
@@ -116,8 +117,7 @@ def make_series(trainings: Sequence[Training], folder: Path) -> None:
         make_run(training, folder / f"seed{training.seed}")
     first, seeds = trainings[0], [training.seed for training in trainings]
     write_json(
-        folder / SERIES_FILE,
-        {"env_id": first.env_id, "algorithm": first.algorithm, "seeds": seeds},
+        folder / SERIES_FILE, {"env_id": first.env_id, "algorithm": first.algorithm, "seeds": seeds}
     )
 
 
@@ -238,11 +238,9 @@ def finish_series(folder: Path) -> SeriesResult:
         training.settings.steps,
         folder / CURVES_FILE,
     )
-    header = ("metric", "median", "lowest", "highest", *(f"seed{seed}" for seed in runs))
-    lines = (",".join(map(str, row)) for row in [header, *result.rows()])
-    write_text(
-        folder / SEEDS_FILE, "".join(f"{line}\n" for line in lines)
-    )  # last: it marks the series as finished
+    titles = ("metric", "median", "lowest", "highest", *(f"seed{seed}" for seed in runs))
+    # last: it marks the series as finished
+    write_text(folder / SEEDS_FILE, csv_table(titles, result.rows()))
     return result
 
 

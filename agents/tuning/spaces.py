@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any
 
 from optuna import Trial
@@ -19,7 +20,7 @@ from ..controllers.linear import LinearSettings
 from ..controllers.simple import HeadingFeedback, HeadingGains
 from ..learning.algorithms import settings_for
 from ..registry import agent_entry
-from ..settings import tuned, value_at, with_values
+from ..settings import tuned, with_values
 
 Range = tuple[float, float, bool]
 """From, to, and whether equal ratios are equal steps; whole numbers if its ends are."""
@@ -94,7 +95,7 @@ def _starting(settings: Any, ranges: Mapping[str, Range]) -> dict[str, float]:
     start: dict[str, float] = {}
     for path, (low, high, by_ratio) in ranges.items():
         middle = math.sqrt(low * high) if by_ratio else 0.5 * (low + high)
-        value = value_at(settings, path)
+        value = attrgetter(path)(settings)
         start[path] = min(max(middle if value is None else value, low), high)
     return start
 

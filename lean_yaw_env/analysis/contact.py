@@ -9,7 +9,7 @@ import numpy as np
 
 from lean_yaw_env.analysis.limit_cycle import find_limit_cycle
 from lean_yaw_env.analysis.section_map import CommandArguments, WalkerOrMap
-from lean_yaw_env.parameters import STATE_SIZE, Foot, Vector
+from lean_yaw_env.parameters import Foot, Vector
 from lean_yaw_env.validation import require_count
 
 if TYPE_CHECKING:
@@ -68,13 +68,7 @@ def floor_demand(
     cycle = find_limit_cycle(walker, **command)
     demands = []
     for step in cycle.steps:
-        motion = cycle.section_map.stander.stance_motion(
-            step.start[:STATE_SIZE],
-            duration=step.duration,
-            samples=samples,
-            stance=step.foot,
-            **step.command._asdict(),
-        )
+        motion = cycle.stance_motion(step, samples)
         columns = ("time", "normal_force", "friction_demand", "yaw_torque")
         demands.append(StepDemand(step.foot, *(motion[name] for name in columns)))
     normal = np.concatenate([demand.normal_force for demand in demands])

@@ -119,6 +119,11 @@ class Branch:
         """Whether the gait at each point is stable, shape (n,)."""
         return spectral_radii(self.eigenvalues, self.section_map.neutral_within) < 1.0
 
+    @property
+    def ends_of_stability(self) -> list[float]:
+        """Values of the parameter at which a multiplier leaves the unit circle, in the branch's order."""
+        return [event.value for event in self.events if event.is_leaving]
+
     def cycle(self, index: int) -> LimitCycle:
         """The gait at a point of the branch."""
         require_count("index", index, -len(self.values), len(self.values) - 1)

@@ -79,10 +79,7 @@ def modes(cycle: LimitCycle) -> tuple[Mode, ...]:
 
 
 def _mode(
-    cycle: LimitCycle,
-    value: complex,
-    left: NDArray[np.complex128],
-    right: NDArray[np.complex128],
+    cycle: LimitCycle, value: complex, left: NDArray[np.complex128], right: NDArray[np.complex128]
 ) -> Mode:
     factors = np.abs(left * right)
     weights = factors if factors.sum() > _NO_PART else np.abs(right) ** 2

@@ -25,7 +25,7 @@ from lean_yaw_env.analysis.section_map import (
     section_map_of,
 )
 from lean_yaw_env.errors import LeanYawError, NoGaitError
-from lean_yaw_env.parameters import Vector
+from lean_yaw_env.parameters import STATE_SIZE, Vector
 from lean_yaw_env.passive import PassiveWalker
 from lean_yaw_env.validation import require_count
 from lean_yaw_env.walker import Walker
@@ -153,6 +153,12 @@ class LimitCycle:
             previous_offset=commands[0].previous_offset,
         )
         return walk.show(height)
+
+    def stance_motion(self, step: CycleStep, samples: int = 50) -> dict[str, Vector]:
+        """The motion and the contact forces within one of the gait's steps; see ``Walker.stance_motion``."""
+        return self.section_map.stander.stance_motion(
+            step.start[:STATE_SIZE], duration=step.duration, samples=samples, stance=step.foot, **step.command._asdict()
+        )  # fmt: skip
 
     @cached_property
     def turning_radius(self) -> float:

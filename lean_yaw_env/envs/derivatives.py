@@ -246,7 +246,7 @@ class LinearisedSteps:
         self.outputs = (*self.followed, *observed, "reward", "duration")
         n = simulation.n
         self._differentiate = compiled_for(
-            task, differentiate, ("read_observation",), lambda: _tables(task)
+            task, differentiate, (read_observation,), lambda: _tables(task)
         )
         self._before = simulation.walkers.copy(), simulation.tasks.copy()
         self._afters = np.zeros(n), np.zeros((n, STATE_SIZE))

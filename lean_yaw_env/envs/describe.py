@@ -9,7 +9,6 @@ from __future__ import annotations
 import inspect
 import re
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 
 from lean_yaw_env.envs.info import INFOS, OPTIONAL_INFOS
@@ -26,13 +25,7 @@ from lean_yaw_env.envs.tasks import Task, task_named
 from lean_yaw_env.files import write_text
 from lean_yaw_env.parameters import INTER_LEG_ANGLE, PARAMETER_NAMES, STATE_FIELDS
 from lean_yaw_env.registration import NAMESPACE, TASK_VERSIONS
-
-
-def table(header: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    """A table in Markdown."""
-    titles = list(header)
-    lines = [titles, ["---"] * len(titles), *([str(cell) for cell in row] for row in rows)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+from lean_yaw_env.tables import markdown_table
 
 
 def describe_observation() -> str:
@@ -45,7 +38,7 @@ def describe_observation() -> str:
     ]
     rows.append((5, "mass_offset", "leg lengths", "0", f"{OFFSET_SCALE:g}", "mass offset in force"))
     rows.append((6, "stance_foot", "", "0", "1", "+1 left, -1 right; only with `mirror=False`"))
-    return table(("number", "name", "unit", "centre", "scale", "meaning"), rows)
+    return markdown_table(("number", "name", "unit", "centre", "scale", "meaning"), rows)
 
 
 def describe_action() -> str:
@@ -61,19 +54,19 @@ def describe_action() -> str:
         (0, angle, f"{middle - turn:g} to {middle + turn:g} rad"),
         (1, offset, f"-{reach:g} to {reach:g}"),
     )
-    return table(("number", "sets", "range"), rows)
+    return markdown_table(("number", "sets", "range"), rows)
 
 
 def describe_start() -> str:
     """How far a start is from the gait, and what bodies are drawn."""
-    start = table(
+    start = markdown_table(
         ("coordinate", "largest deviation"),
         (
             (field.name, f"{reach:g} {field.unit}")
             for field, reach in zip(STATE_FIELDS, START_DEVIATIONS, strict=True)
         ),
     )
-    bodies = table(
+    bodies = markdown_table(
         ("parameter", "training", "held out, outside the training box"),
         (
             (name, f"within {reach:g}", f"within {HELD_OUT_REACH * reach:g}")
@@ -94,13 +87,13 @@ def describe_options() -> str:
         default = getattr(EnvOptions(), name)
         meaning = " ".join(line.strip() for line in body).replace("``", "`")
         rows.append((f"`{name}`", f"`{default}`", kind, meaning))
-    return table(("option", "default", "values", "meaning"), rows)
+    return markdown_table(("option", "default", "values", "meaning"), rows)
 
 
 def describe_info() -> str:
     """The contents of every task's ``info``."""
     infos = ((f"`{info.key}`", info.unit, info.meaning) for info in (*INFOS, *OPTIONAL_INFOS))
-    return table(("key", "unit", "meaning"), infos)
+    return markdown_table(("key", "unit", "meaning"), infos)
 
 
 def describe_task(task: Task) -> str:
@@ -128,14 +121,14 @@ def describe_task(task: Task) -> str:
         bounds = f"each in [{command.low:.4g}, {command.high:.4g}]"
         facts.append((f"reset option `{name}`", f"{command.meaning}; {bounds}"))
     facts.append(("versions", " ".join(task.history)))
-    parts = [task.summary, table(("", ""), facts)]
+    parts = [task.summary, markdown_table(("", ""), facts)]
     observed = [(f.name, f.unit, f"{f.centre:g}", f"{f.scale:g}", f.meaning) for f in task.observed]
     if observed:
         parts.append("Observed after the common numbers:")
-        parts.append(table(("name", "unit", "centre", "scale", "meaning"), observed))
+        parts.append(markdown_table(("name", "unit", "centre", "scale", "meaning"), observed))
     parts.append("Success, in `info`:")
     parts.append(
-        table(("key", "meaning"), [(f"`{k}`", m.meaning) for k, m in task.metrics.items()])
+        markdown_table(("key", "meaning"), [(f"`{k}`", m.meaning) for k, m in task.metrics.items()])
     )
     return "\n\n".join(parts)
 

@@ -10,6 +10,7 @@ from lean_yaw_env.envs.goal_env import WaypointGoalEnv, WaypointGoalVectorEnv
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
 from lean_yaw_env.envs.walker_env import WalkerEnv
+from lean_yaw_env.extras import is_gpu
 from lean_yaw_env.registration import GOAL_TASK
 
 _VECTOR = "Vector"
@@ -28,6 +29,15 @@ def _make(task: str, many: bool, /, **arguments: Any) -> WalkerEnv | WalkerVecto
         raise ValueError(
             f"task is fixed by the id to {task!r}, got {arguments['task']!r}: make the id of that task"
         )
+    if is_gpu(arguments.get("device", "cpu")):
+        if not many or task == GOAL_TASK:
+            raise ValueError(
+                f"device='cuda' is for gymnasium.make_vec and tasks other than {GOAL_TASK}; leave device='cpu'"
+            )
+        from lean_yaw_env.envs.device_env import DeviceVectorEnv
+
+        return DeviceVectorEnv(task=task_named(task), **arguments)
+    arguments.pop("device", None)
     if task == GOAL_TASK:
         return (WaypointGoalVectorEnv if many else WaypointGoalEnv)(**arguments)
     return (WalkerVectorEnv if many else WalkerEnv)(task=task_named(task), **arguments)

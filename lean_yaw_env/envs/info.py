@@ -158,9 +158,10 @@ class InfoMaker:
     def many(self, table: Vector, falls: NDArray[np.int64], mask: Flags) -> dict[str, Any]:
         """The infos of a vector environment, views of its table (n, size), each key beside its mask."""
         info: dict[str, Any] = dict.fromkeys(self._masks, mask)
-        numbers, state, footprint = self.views(table.T)
-        info.update(zip(self._names, numbers, strict=False))
-        return {**info, "state": state.T, "footprint": footprint.T, "fall": falls}
+        columns = range(*self._columns.indices(self.size))
+        info.update((name, table[:, k]) for name, k in zip(self._names, columns, strict=False))
+        state, footprint = table[:, :STATE_SIZE], table[:, STATE_SIZE:_FIRST_NUMBER]
+        return {**info, "state": state, "footprint": footprint, "fall": falls}
 
 
 class InfoTable:

@@ -78,6 +78,17 @@ def observe(observation, walker, task, settings):
     corrupt(observation, walker, settings)
 
 
+def write_row(event, walker, task, settings, observation, rewards, ends, i):
+    """Write a walker's reward, ends and observation, as ``write_outputs`` does for many."""
+    if event == _STEP:
+        rewards[i], ends[0, i], ends[1, i] = reward_and_ends(walker, task, settings)
+    if event == _RESET:
+        TASK_START(walker, task)
+    if event != _NONE:
+        TASK_REFRESH(walker, task)
+        observe(observation, walker, task, settings)
+
+
 def write_outputs(
     event, walkers, tasks, settings, observations, rewards, ends, infos, skip, first, last
 ):  # fmt: skip
@@ -101,30 +112,28 @@ def write_outputs(
         if skip[i]:
             continue
         walker, task = walkers[i], tasks[i]
-        if event == _STEP:
-            rewards[i], ends[0, i], ends[1, i] = reward_and_ends(walker, task, common)
-        if event == _RESET:
-            TASK_START(walker, task)
-        if event != _NONE:
-            TASK_REFRESH(walker, task)
-            observe(observations[i], walker, task, common)
+        write_row(event, walker, task, common, observations[i], rewards, ends, i)
         if len(infos) > 0:
             REPORT(infos[i], walker, task)
 
 
 def outputs_of(task: Task) -> Any:
     """The compiled ``write_outputs`` of a task."""
-    parts = ("reward_and_ends", "observe")
-    return compiled_for(task, write_outputs, parts, lambda: {"REPORT": info_report(task)})
+    return compiled_for(task, write_outputs, ROW_PARTS, lambda: {"REPORT": info_report(task)})
+
+
+ROW_PARTS = (reward_and_ends, observe, write_row)
+"""The parts that a template which calls ``write_row`` has."""
 
 
 def compiled_for(
     task: Task,
     template: Callable[..., Any],
-    parts: Sequence[str],
+    parts: Sequence[Any],
     own_tables: Callable[[], dict[str, Any]],
+    fill: Callable[..., Any] = entry_point_with,
 ) -> Any:
-    """A template with a task's formulas and tables; tasks that have the same ones share what is compiled."""
+    """A template with a task's formulas and tables, made by ``fill``; tasks that have the same ones share what is compiled."""
     formulas = {
         "TASK_START": task.start,
         "TASK_REWARD": task.reward,
@@ -147,9 +156,7 @@ def compiled_for(
     if key not in _COMPILED:
         names = [f"{each.__module__}.{each.__qualname__}" for each in formulas.values()]
         digest = hashlib.sha256(repr((names, contents)).encode()).hexdigest()[:16]
-        _COMPILED[key] = entry_point_with(
-            template, digest, formulas, parts, **tables, **own_tables()
-        )
+        _COMPILED[key] = fill(template, digest, formulas, parts, **tables, **own_tables())
     return _COMPILED[key]
 
 

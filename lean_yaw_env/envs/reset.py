@@ -50,35 +50,37 @@ def deviation(walker: Any, settings: Any, k: int) -> Any:
     return settings.gait[k] + uniform(walker, -reach, reach)
 
 
+@formula
+def start_episode(walker: Any, body: Any, settings: Any) -> None:
+    """Put a walker at its start. Its record holds zeros and a key already."""
+    if settings.random_body != _NOMINAL:
+        draw_body(body, walker, settings)
+    else:
+        body[SLOPE] = settings.body_centre[SLOPE]
+    walker.hip_width = body[0]
+    walker.foot_radius = body[1]
+    walker.ankle_tilt = body[2]
+    walker.slope = body[3]
+    side = 1.0 if uniform(walker, 0.0, 1.0) < 0.5 else -1.0
+    walker.side = side
+    walker.heading = side * deviation(walker, settings, 0)
+    walker.stance_pitch = deviation(walker, settings, 1)
+    walker.ankle_angle = side * deviation(walker, settings, 2)
+    walker.stance_pitch_rate = deviation(walker, settings, 3)
+    walker.ankle_rate = side * deviation(walker, settings, 4)
+    walker.previous_heading = walker.heading
+    walker.inter_leg_angle = settings.inter_leg_angle
+    walker.pending_angle = settings.inter_leg_angle
+    # a gait of pumping has the masses on alternate sides
+    walker.mass_offset = side * settings.gait_offset
+    walker.commanded_offset = walker.mass_offset
+    walker.pending_offset = -walker.mass_offset
+
+
 @entry_point()
 def start_episodes(walkers, bodies, settings, skip):
-    """Put walkers, but those to skip, at their starts. Their records hold zeros and a key already."""
+    """Put walkers, but those to skip, at their starts."""
     walkers, bodies, settings = borrowed(walkers), borrowed(bodies), borrowed(settings)
-    common = settings[0]
     for i in range(len(walkers)):
-        if skip[i]:
-            continue
-        walker = walkers[i]
-        body = bodies[i if len(bodies) > 1 else 0]
-        if common.random_body != _NOMINAL:
-            draw_body(body, walker, common)
-        else:
-            body[SLOPE] = common.body_centre[SLOPE]
-        walker.hip_width = body[0]
-        walker.foot_radius = body[1]
-        walker.ankle_tilt = body[2]
-        walker.slope = body[3]
-        side = 1.0 if uniform(walker, 0.0, 1.0) < 0.5 else -1.0
-        walker.side = side
-        walker.heading = side * deviation(walker, common, 0)
-        walker.stance_pitch = deviation(walker, common, 1)
-        walker.ankle_angle = side * deviation(walker, common, 2)
-        walker.stance_pitch_rate = deviation(walker, common, 3)
-        walker.ankle_rate = side * deviation(walker, common, 4)
-        walker.previous_heading = walker.heading
-        walker.inter_leg_angle = common.inter_leg_angle
-        walker.pending_angle = common.inter_leg_angle
-        # a gait of pumping has the masses on alternate sides
-        walker.mass_offset = side * common.gait_offset
-        walker.commanded_offset = walker.mass_offset
-        walker.pending_offset = -walker.mass_offset
+        if not skip[i]:
+            start_episode(walkers[i], bodies[i if len(bodies) > 1 else 0], settings[0])

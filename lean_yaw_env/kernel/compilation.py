@@ -265,18 +265,32 @@ def entry_point_with(
     template: Callable[..., Any],
     name: str,
     formulas: Mapping[str, Callable[..., Any]],
-    parts: Sequence[str] = (),
+    parts: Sequence[FunctionType] = (),
     **constants: Any,
 ) -> Any:
-    """Compile a template as an entry point of its own, with formulas and constants in the place of its globals of the same names.
+    """Compile a template as an entry point of its own; arguments as of ``filled``, which says under which name the machine code is kept."""
+    return entry_point(tuple(formulas.values()))(
+        filled(template, name, formulas, parts, **constants)
+    )
 
-    ``parts`` names the functions of the template's module that it calls and whose globals are replaced alike. The machine code is
-    kept under the template's name and ``name``.
+
+def filled(
+    template: Callable[..., Any],
+    name: str,
+    formulas: Mapping[str, Callable[..., Any]],
+    parts: Sequence[FunctionType] = (),
+    **constants: Any,
+) -> Any:
+    """A template with formulas and constants in the place of its globals of the same names; it is called by its name and ``name``.
+
+    ``parts`` are the functions that it calls, of its own module or another, whose globals are replaced alike.
     """
-    names = {**template.__globals__, **formulas, **constants}
-    names |= {part: formula(_rebound(names[part], names, part)) for part in parts}
-    function = _rebound(template, names, f"{template.__name__}_{name}")
-    return entry_point(tuple(formulas.values()))(function)
+    names: dict[str, Any] = {}
+    for part in parts:
+        names |= part.__globals__
+    names |= {**template.__globals__, **formulas, **constants}
+    names |= {part.__name__: formula(_rebound(part, names, part.__name__)) for part in parts}
+    return _rebound(template, names, f"{template.__name__}_{name}")
 
 
 def for_types_of(entry: Any, *arguments: Any) -> Callable[..., Any]:

@@ -16,7 +16,8 @@ import textwrap
 from types import FunctionType
 from typing import Any
 
-from numba.core import types
+from llvmlite import ir
+from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 _PRODUCT, _SUM = "_multiply", "_multiply_add"
@@ -24,11 +25,24 @@ _NUMBERS = (types.Float, types.Integer, types.Complex)
 
 
 def _product_code(typing_context, a, b):
-    return _first_order((a, b), lambda builder, a, b: builder.fmul(a, b), _product_derivative)
+    return _first_order((a, b), _product, _product_derivative)
 
 
 def _sum_code(typing_context, a, b, c):
-    return _first_order((a, b, c), lambda builder, a, b, c: builder.fma(a, b, c), _sum_derivative)
+    return _first_order((a, b, c), _fused_sum, _sum_derivative)
+
+
+def _product(context, builder, a, b):
+    if context.target_name != "cuda":
+        return builder.fmul(a, b)
+    # CUDA's compiler fuses products and sums as it pleases, but for a product that is rounded by its name
+    rounded = ir.FunctionType(ir.DoubleType(), [ir.DoubleType()] * 2)
+    product = cgutils.get_or_insert_function(builder.module, rounded, "llvm.nvvm.mul.rn.d")
+    return builder.call(product, [a, b])
+
+
+def _fused_sum(context, builder, a, b, c):
+    return builder.fma(a, b, c)
 
 
 def _first_order(kinds, value, derivative):
@@ -42,7 +56,7 @@ def _first_order(kinds, value, derivative):
         parts = [
             _parts(context, builder, *each) for each in zip(signature.args, values, strict=True)
         ]
-        real = value(builder, *(part[0] for part in parts))
+        real = value(context, builder, *(part[0] for part in parts))
         if not is_complex:
             return real
         number = context.make_complex(builder, types.complex128)

@@ -297,13 +297,19 @@ def careful_step(work, i):
 
 
 @inlined
-def walking_step(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side):
-    """One walking step; numbers may be complex to carry a derivative, every decision looks at real parts."""
-    state = SectionState(heading, pitch, ankle, pitch_rate, ankle_rate)
+def quick_step(body, command, state, side):
+    """One walking step; ``FAILED`` if its landing is not found."""
     stance, flight = begin(body, command, state, side)
     while flight.status == FLYING:
         flight = advance(stance, flight)
-    outcome = finish(stance, flight)
+    return finish(stance, flight)
+
+
+@inlined
+def walking_step(body, command, heading, pitch, ankle, pitch_rate, ankle_rate, side):
+    """One walking step; numbers may be complex to carry a derivative, every decision looks at real parts."""
+    state = SectionState(heading, pitch, ankle, pitch_rate, ankle_rate)
+    outcome = quick_step(body, command, state, side)
     if outcome.status == FAILED:
         outcome = _walk_carefully(body, command, state, side)
     return outcome

@@ -12,12 +12,7 @@ from lean_yaw_env.multibody.gait import (
     table3_c_eigenvalues,
 )
 from lean_yaw_env.multibody.phase import FALLS
-from lean_yaw_env.multibody.walker import (
-    ForceExtremes,
-    MultibodyStep,
-    MultibodyWalker,
-    Trajectory,
-)
+from lean_yaw_env.multibody.walker import ForceExtremes, MultibodyStep, MultibodyWalker, Trajectory
 
 __all__ = [
     "FALLS",

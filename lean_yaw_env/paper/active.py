@@ -99,7 +99,7 @@ def figure_11(points: int = 196) -> Result:
 def stable_slope() -> float:
     """The slope at which the flat active walker with ankle tilt 0.55 becomes stable; nan if no multiplier crosses."""
     branch = continue_gait(flat_active_walker(_SLOPES_11[1]), "slope", _SLOPES_11, upward=False)
-    return branch.events[0].value if branch.events else float("nan")
+    return branch.events[0].value if branch.events else np.nan
 
 
 def figure_13(slopes: int = 100, radii: int = 91) -> Result:

@@ -9,13 +9,14 @@ in SI units.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
+
+from lean_yaw_env.tables import read_csv
 
 Verdict = Literal["agrees", "agrees within rounding", "differs", "open"]
 VERDICTS: tuple[Verdict, ...] = ("agrees", "agrees within rounding", "differs", "open")
@@ -75,16 +76,11 @@ class Printed:
 def _rows() -> dict[str, Printed]:
     found: dict[str, Printed] = {}
     for table in ("printed.csv", "classics.csv"):
-        with Path(__file__).with_name(table).open(encoding="utf-8", newline="") as file:
-            for row in csv.DictReader(file):
-                found[row["name"]] = Printed(
-                    *(row[key] for key in ("name", "printed", "where", "meaning")),
-                    tolerance=float(row["tolerance"]) if row["tolerance"] else None,
-                    allowed=row["allowed"],
-                    is_open=bool(row["open"]),
-                    remark=row["remark"],
-                    otherwise=row["otherwise"],
-                )
+        for row in read_csv(Path(__file__).with_name(table)):
+            is_open, tolerance = bool(row.pop("open")), row.pop("tolerance")
+            found[row["name"]] = Printed(
+                **row, is_open=is_open, tolerance=float(tolerance) if tolerance else None
+            )
     return found
 
 

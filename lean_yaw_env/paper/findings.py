@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,11 +21,12 @@ from lean_yaw_env.analysis import (
     stability_map,
 )
 from lean_yaw_env.analysis.attraction import require_plane, states_in
-from lean_yaw_env.files import write_text
+from lean_yaw_env.files import require_writable, write_text
 from lean_yaw_env.paper.drawing import FAINT, STABLE_FACE, name_axes, picture_of
 from lean_yaw_env.paper.report import write_columns
 from lean_yaw_env.parameters import Vector, WalkerParameters
 from lean_yaw_env.rendering.figures import new_figure
+from lean_yaw_env.tables import markdown_table, read_csv
 from lean_yaw_env.walker import Walker
 
 if TYPE_CHECKING:
@@ -148,71 +148,51 @@ def numbers(found: Findings) -> dict[str, tuple[float, str]]:
     pumping, stability = found.pumping, found.stability
     angles = pumping.inter_leg_angle.to_numpy()
     rows: dict[str, tuple[float, str]] = {}
+
+    def note(name: str, value: Any, meaning: str) -> None:
+        rows[name] = float(value), meaning
+
     words = {
         "gait": "with a gait", "stable": "with a gait that balances itself",
         "friction": f"with a gait that balances itself at friction {FRICTION}",
     }  # fmt: skip
     for name, climb in climbs(pumping).items():
         best = int(np.nanargmax(climb))
-        rows[f"climb_{name}"] = float(climb[best]), f"steepest climb {words[name]}, rad"
-        rows[f"climb_{name}_angle"] = float(angles[best]), "inter-leg angle there, rad"
+        note(f"climb_{name}", climb[best], f"steepest climb {words[name]}, rad")
+        note(f"climb_{name}_angle", angles[best], "inter-leg angle there, rad")
     level = pumping.sel(slope=0.0, method="nearest")
     held = is_stable(level)
     on_floor = held & (level.greatest_friction <= FRICTION)
     for name, where in (("stable", held), ("friction", on_floor)):
         speed = level.speed.where(where)
-        rows[f"level_speed_{name}"] = float(speed.max()), f"greatest speed on the level, {name}"
-    force = level.least_normal_force.where(held)
-    rows["level_least_force"] = (
-        float(force.min()),
-        "least normal force of these gaits on the level, weights",
-    )
+        note(f"level_speed_{name}", speed.max(), f"greatest speed on the level, {name}")
+    force = level.least_normal_force.where(held).min()
+    note("level_least_force", force, "least normal force of these gaits on the level, weights")
     usual = level.sel(inter_leg_angle=0.3, method="nearest")
     offsets = usual.alternating_offset.where(usual.status == 1)
-    rows["level_least_offset"] = (
-        float(offsets.min()),
-        "least alternating offset with a gait on the level at inter-leg angle 0.3",
-    )
-    rows["level_greatest_offset"] = float(offsets.max()), "greatest one"
+    meaning = "least alternating offset with a gait on the level at inter-leg angle 0.3"
+    note("level_least_offset", offsets.min(), meaning)
+    note("level_greatest_offset", offsets.max(), "greatest one")
+    shares = "share of tilts and widths that are stable at"
     for name in ("foot_radius", "inter_leg_angle"):
         for k, value in enumerate(STABILITY[name]):
-            rows[f"stable_share_{name}_{value:g}"] = (
-                float(is_stable(stability[name].isel({name: k})).mean()),
-                f"share of tilts and widths that are stable at {name} {value:g}",
-            )
+            share = is_stable(stability[name].isel({name: k})).mean()
+            note(f"stable_share_{name}_{value:g}", share, f"{shares} {name} {value:g}")
     for k, slope in enumerate(STABILITY["slope"]):
         here = stability["slope"].isel(slope=k)
-        stable = is_stable(here)
-        rows[f"stable_share_{slope:g}"] = (
-            float(stable.mean()),
-            f"share of tilts and widths that are stable at slope {slope:g}",
-        )
-        width = here.hip_width.where(stable)
-        rows[f"stable_width_{slope:g}"] = (
-            float(width.max()),
-            f"widest stable hip at slope {slope:g}",
-        )
-        least = here.ankle_tilt.where(stable).min()
-        rows[f"stable_tilt_{slope:g}"] = (
-            float(least),
-            f"least stable ankle tilt at slope {slope:g}, rad",
-        )
-    for n in range(CHOSEN_STEPS + 1):
-        rows[f"slice_{n}"] = (
-            share_saved(found.slice.least_steps, n),
-            f"share of the slice that {n} chosen steps save",
-        )
-    for n in range(3):
-        rows[f"box_{n}"] = (
-            share_saved(found.box.least_steps, n),
-            f"share of the box that {n} chosen steps save",
-        )
-    for commands, shares in found.resolution:
-        for n, share in enumerate(shares):
-            rows[f"resolution_{commands}_{n}"] = (
-                share,
-                f"share that {n} chosen of {commands} commands save",
-            )
+        stable, at = is_stable(here), f"slope {slope:g}"
+        note(f"stable_share_{slope:g}", stable.mean(), f"{shares} {at}")
+        width, tilt = here.hip_width.where(stable).max(), here.ankle_tilt.where(stable).min()
+        note(f"stable_width_{slope:g}", width, f"widest stable hip at {at}")
+        note(f"stable_tilt_{slope:g}", tilt, f"least stable ankle tilt at {at}, rad")
+    for part, steps, data in (("slice", CHOSEN_STEPS, found.slice), ("box", 2, found.box)):
+        for n in range(steps + 1):
+            saved = share_saved(data.least_steps, n)
+            note(f"{part}_{n}", saved, f"share of the {part} that {n} chosen steps save")
+    for commands, saves in found.resolution:
+        for n, saved in enumerate(saves):
+            meaning = f"share that {n} chosen of {commands} commands save"
+            note(f"resolution_{commands}_{n}", saved, meaning)
     return rows
 
 
@@ -330,7 +310,7 @@ def write_findings(folder: Path, *, size: float = 1.0, progress: bool = False) -
 
     The section about agents takes its numbers from capture.csv in the folder, which ``python -m agents capture`` writes.
     """
-    (folder / "images").mkdir(parents=True, exist_ok=True)
+    require_writable(folder / "images")
     found = compute(size=size, progress=progress)
     rows = numbers(found)
     values, meanings = zip(*rows.values(), strict=True)
@@ -345,44 +325,31 @@ def write_findings(folder: Path, *, size: float = 1.0, progress: bool = False) -
 
 def page(folder: Path) -> str:
     """The page, every number of it from findings.csv and, where there is one, capture.csv in a folder."""
-    values = {row["name"]: float(row["value"]) for row in _rows(folder / "findings.csv")}
+    values = {row["name"]: float(row["value"]) for row in read_csv(folder / "findings.csv")}
     text = Path(__file__).with_name("findings.txt").read_text(encoding="utf-8")
     own, agents = text.split(_AGENTS)
     # names with points cannot stand in a format string as they are
     filled = own.format(**{name.replace(".", "_"): value for name, value in values.items()})
     if not (folder / "capture.csv").exists():
         return filled.rstrip() + "\n"
-    rows = _rows(folder / "capture.csv")
+    rows = read_csv(folder / "capture.csv")
     shares = {
-        f"{row['task']}_{row['agent']}_{row['friction_limit'].replace('.', '_')}_{key}": float(
-            row[key]
-        )
+        "_".join((row["task"], row["agent"], row["friction_limit"].replace(".", "_"), key)): float(row[key])
         for row in rows
         for key in ("can_be_saved", "saved_of_these", "saved_of_all", "saved_beyond")
         if row["n_steps"] == "2"
-    }
+    }  # fmt: skip
     return filled + _AGENTS + agents.format(agents=_agents(rows), **shares)
-
-
-def _rows(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def _agents(rows: list[dict[str, str]]) -> str:
     """A table in Markdown of what agents save of what can be saved."""
-    lines = [
-        "| task | friction limit | agent | needs no step | one step | two steps | beyond two | of all starts |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    for first in range(0, len(rows), 3):
-        three = rows[first : first + 3]
-        shares = [
-            f"{float(row['saved_of_these']):.1%} of {float(row['can_be_saved']):.1%}"
-            for row in three
-        ]
-        names = [three[0][key] for key in ("task", "friction_limit", "agent")]
-        names[1] = names[1].replace("inf", "none")
-        rest = [f"{float(three[0][key]):.1%}" for key in ("saved_beyond", "saved_of_all")]
-        lines.append(f"| {' | '.join([*names, *shares, *rest])} |")
-    return "\n".join(lines)
+    titles = ("task", "friction limit", "agent", "needs no step", "one step", "two steps", "beyond two", "of all starts")  # fmt: skip
+    lines = []
+    for first, *others in zip(rows[::3], rows[1::3], rows[2::3], strict=True):
+        of_these = ((float(row["saved_of_these"]), float(row["can_be_saved"])) for row in (first, *others))  # fmt: skip
+        shares = [f"{saved:.1%} of {can:.1%}" for saved, can in of_these]
+        limit = first["friction_limit"].replace("inf", "none")
+        rest = [f"{float(first[key]):.1%}" for key in ("saved_beyond", "saved_of_all")]
+        lines.append([first["task"], limit, first["agent"], *shares, *rest])
+    return markdown_table(titles, lines)

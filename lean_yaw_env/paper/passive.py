@@ -197,7 +197,7 @@ def _maximal_slope_section() -> Section:
     branch = continue_gait(
         arc_foot_walker(0.048), "slope", (0.048, 0.08), state=limping.state, n_steps=2
     )
-    leaving = [event.value for event in branch.events if event.is_leaving]
+    leaving = branch.ends_of_stability
     usual, wider = (
         doubling_slope(arc_foot_walker(foot_radius=radius), (0.0003, 0.08))
         for radius in (0.5, 0.5045)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -22,6 +21,7 @@ from lean_yaw_env.paper import (
 from lean_yaw_env.paper.checks import Result
 from lean_yaw_env.parameters import WalkerParameters
 from lean_yaw_env.rendering import draw_walker
+from lean_yaw_env.tables import read_csv
 
 PAPER, CLASSICS = "paper", "classics"
 """Groups of pieces: what the paper has, and what other publications have."""
@@ -86,8 +86,8 @@ _MAKERS: dict[str, Callable[[], Result]] = {
 
 
 def _pieces() -> tuple[Piece, ...]:
-    with Path(__file__).with_name("pieces.csv").open(encoding="utf-8", newline="") as file:
-        return tuple(Piece(make=_MAKERS[row["name"]], **row) for row in csv.DictReader(file))
+    rows = read_csv(Path(__file__).with_name("pieces.csv"))
+    return tuple(Piece(make=_MAKERS[row["name"]], **row) for row in rows)
 
 
 PIECES = _pieces()

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import base64
-import csv
 import hashlib
-import io
 import itertools
 import re
 from collections.abc import Iterable, Sequence
@@ -24,6 +22,7 @@ from lean_yaw_env.extras import needs_extra
 from lean_yaw_env.files import locked, read_json, write_json, write_text
 from lean_yaw_env.paper.checks import VERDICTS, Check, Columns, Result, Section
 from lean_yaw_env.paper.registry import CLASSICS, PAPER, Piece, pieces_named
+from lean_yaw_env.tables import csv_table, markdown_table
 
 _FINISHED = ".finished"
 """Folder with what is finished, a file for each piece."""
@@ -192,11 +191,7 @@ def write_columns(path: Path, columns: Columns) -> None:
     ValueError
         If the columns have different lengths.
     """
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
-    write_text(path, text.getvalue())
+    write_text(path, csv_table(columns, zip(*columns.values(), strict=True)))
 
 
 def write_report(reproduction: Reproduction, folder: Path) -> tuple[Path, Path]:
@@ -232,7 +227,8 @@ def as_markdown(reproduction: Reproduction) -> str:
         for section in each.result.sections:
             parts += [f"### {section.title}", section.text]
             if section.table:
-                parts.append(_table(section.table, zip(*section.table.values(), strict=True)))
+                rows = zip(*section.table.values(), strict=True)
+                parts.append(markdown_table(list(section.table), rows))
         if each.result.tables:
             files = ", ".join(f"[{stem}.csv]({stem}.csv)" for stem in each.result.tables)
             parts.append(f"Numbers: {files}")
@@ -283,12 +279,4 @@ def _checks_table(checks: Iterable[Check]) -> str:
         what = f"{check.name}: {check.statement}"
         both = (what, check.where, check.paper, check.ours, difference)
         rows.append((*both, check.allowed, check.verdict, check.remark))
-    return _table(_HEADINGS, rows)
-
-
-def _table(headings: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    headings = list(headings)
-    lines = ["| " + " | ".join(headings) + " |", "|" + "---|" * len(headings)]
-    for row in rows:
-        lines.append("| " + " | ".join(str(cell).replace("|", "\\|") for cell in row) + " |")
-    return "\n".join(lines)
+    return markdown_table(_HEADINGS, rows)

@@ -97,7 +97,7 @@ def doubling_slopes(most_steps: int = 8) -> tuple[float, ...]:
         state = find_periodic_gait(walker, n_steps=n_steps).state
         limits = (0.99 * slope, slope + 1.5 * gap)
         branch = continue_gait(walker, "slope", limits, state=state, n_steps=n_steps)
-        found.append(next(event.value for event in branch.events if event.is_leaving))
+        found.append(branch.ends_of_stability[0])
         gap, n_steps = (found[-1] - found[-2]) / _FEIGENBAUM, 2 * n_steps
     return tuple(found)
 

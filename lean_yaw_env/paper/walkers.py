@@ -163,8 +163,7 @@ def root(function: Any, low: float, high: float, tolerance: float) -> float:
 def doubling_slope(walker: PassiveWalker, limits: tuple[float, float]) -> float:
     """The slope at which the planar gait's period doubles, so that it stops being stable; or nan."""
     branch = continue_gait(walker, "slope", limits, state=gait_of(walker).state)
-    leaving = [event.value for event in branch.events if event.is_leaving]
-    return leaving[0] if leaving else float("nan")
+    return next(iter(branch.ends_of_stability), math.nan)
 
 
 def lateral_radius(slope: float) -> float:

@@ -18,14 +18,7 @@ from lean_yaw_env.analysis import Branch, continue_gait, stability_map
 from lean_yaw_env.engine import Engine
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.paper.checks import Check, Result, assess, compare, printed
-from lean_yaw_env.paper.drawing import (
-    MULTIPLIER,
-    STABLE_FACE,
-    TILT,
-    TOP,
-    name_axes,
-    picture_of,
-)
+from lean_yaw_env.paper.drawing import MULTIPLIER, STABLE_FACE, TILT, TOP, name_axes, picture_of
 from lean_yaw_env.paper.walkers import (
     flat_active_walker,
     flat_passive_walker,
@@ -319,7 +312,7 @@ def lower_edge(hip_width: float) -> tuple[Vector, Vector]:
     radii = np.abs(branch.eigenvalues).max(axis=1) ** (2 // branch.n_steps)
     stable = int(np.argmax(~branch.is_stable)) if not branch.is_stable.all() else radii.size
     tilts, radii = branch.values[:stable], radii[:stable]
-    leaving = [event.value for event in branch.events if event.is_leaving]
+    leaving = branch.ends_of_stability
     if leaving and stable:
         tilts, radii = np.append(tilts, leaving[0]), np.append(radii, 1.0)
     return tilts[::-1], radii[::-1]
@@ -335,8 +328,7 @@ def stable_tilt_ends(hip_width: float) -> tuple[float, float]:
     ends = []
     for upward in (False, True):
         branch = continue_gait(walker, "ankle_tilt", (0.02, 0.5 * np.pi), upward=upward)
-        leaving = [event.value for event in branch.events if event.is_leaving]
-        ends.append(leaving[0] if leaving else float(branch.values[-1]))
+        ends.append(next(iter(branch.ends_of_stability), float(branch.values[-1])))
     return ends[0], ends[1]
 
 

@@ -91,15 +91,6 @@ class Canvas:
             for place in (start, end):
                 self.disc(place, 0.5 * width, colour)
 
-    def dashes(
-        self, start: Vector, end: Vector, colour: Colour, width: float, dash: float = 5.0
-    ) -> None:
-        """A straight dashed line; equal dashes and gaps, a dash at each end."""
-        count = max(1, 2 * round(0.5 * (np.linalg.norm(end - start) / dash - 1.0)) + 1)
-        for i in range(0, count, 2):
-            left, right = (start + (end - start) * k / count for k in (i, i + 1))
-            self.bar(left, right, colour, width)
-
     def disc(self, centre: Vector, radius: float, colour: Colour) -> None:
         self._pygame.draw.circle(self._surface, colour, _fine(centre), OVERSAMPLING * radius)
 

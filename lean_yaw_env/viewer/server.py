@@ -60,7 +60,9 @@ class _Handler(SimpleHTTPRequestHandler):
         if name not in _NAMES:
             self.send_error(403, "this server answers to its own machine only")
             return None
-        return self._send_index() if urlsplit(self.path).path == f"/{_INDEX}" else super().send_head()
+        return (
+            self._send_index() if urlsplit(self.path).path == f"/{_INDEX}" else super().send_head()
+        )
 
     def _send_index(self) -> io.BytesIO:
         content = json_text(agent_index(), indent=None).encode()
@@ -133,7 +135,10 @@ class PageServer:
             places[_AGENTS] = trained
         if policy is not None:
             folder = require_path(policy, "policy").resolve()
-            task = task or _task_of(folder)
+            own = _task_of(folder)
+            if task not in (None, own):
+                raise ValueError(f"the policy in {folder} is for {own}, and task is {task!r}")
+            task = own
             places |= {f"{_OWN}/{name}": folder / name for name in (CARD, WEIGHTS)}
             settings = {"policy": f"{_OWN}/policy"}
             agents = (*agents, _OWN)
@@ -175,12 +180,16 @@ def _task_of(folder: Path) -> str:
     """The task that the policy in a folder was trained for."""
     for name in (CARD, WEIGHTS):
         if not (folder / name).is_file():
-            raise FileNotFoundError(f"no {name} in {folder}: policy must be a folder that train.py has written")
+            raise FileNotFoundError(
+                f"no {name} in {folder}: policy must be a folder that train.py has written"
+            )
     card = read_json(folder / CARD)
     env_id = str(card.get("env_id") if isinstance(card, dict) else None)
     ids = {f"{NAMESPACE}/{task}-v{version}": task for task, version in TASK_VERSIONS.items()}
     if env_id not in ids:
-        raise ValueError(f"the policy in {folder} is for {env_id}, and the page has {', '.join(ids)}")
+        raise ValueError(
+            f"the policy in {folder} is for {env_id}, and the page has {', '.join(ids)}"
+        )
     return ids[env_id]
 
 
