@@ -2,14 +2,34 @@
 
 ``load("LeanYaw/Heading-v1")`` gives a trained policy that comes with the package, ``load(folder)`` one of your own; policies need
 ``lean-yaw-env[agents]``, training ``lean-yaw-env[train]``, the controllers nothing more than the walker itself. In a checkout the package is
-``agents``, in an installation ``lean_yaw_env.agents``.
+``agents``, in an installation ``lean_yaw_env.agents``. Everything is loaded when it is first used, so that commands start quickly.
 """
 
-from .agent import Agent
-from .controllers.simple import FixedController, HeadingFeedback, HeadingGains, RandomController
-from .policies.policy import Policy, PolicyCard
-from .policies.policy_files import PolicyFileError, load, save, shipped_seeds
-from .registry import AGENTS, AgentRequest, make_agent
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .agent import Agent
+    from .controllers.simple import FixedController, HeadingFeedback, HeadingGains, RandomController
+    from .policies.policy import Policy, PolicyCard
+    from .policies.policy_files import PolicyFileError, load, save, shipped_seeds
+    from .registry import AGENTS, AgentRequest, make_agent
+
+_EXPORTS = {
+    "agent": ("Agent",),
+    "controllers.simple": (
+        "FixedController",
+        "HeadingFeedback",
+        "HeadingGains",
+        "RandomController",
+    ),
+    "policies.policy": ("Policy", "PolicyCard"),
+    "policies.policy_files": ("PolicyFileError", "load", "save", "shipped_seeds"),
+    "registry": ("AGENTS", "AgentRequest", "make_agent"),
+}
+"""Names by the module that defines them."""
 
 __all__ = [
     "AGENTS",
@@ -27,3 +47,14 @@ __all__ = [
     "save",
     "shipped_seeds",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _EXPORTS.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(set(globals()) | set(__all__))

@@ -19,8 +19,9 @@ from rich.console import Console
 from typer import Argument, Option
 
 from lean_yaw_env.extras import needs_extra
+from lean_yaw_env.files import require_writable
 from lean_yaw_env.registration import TASK_VERSIONS
-from lean_yaw_env.reporting import keep, reporting
+from lean_yaw_env.reporting import keep, reporting, uninterrupted
 
 ALL = "all"
 CACHE = "evaluations"
@@ -177,6 +178,7 @@ def tune(
         from .tuning.linear import tune_linear
 
         file = out or Path("runs", "tuning", f"{agent}-{task}.best.json")
+        keep(f"finished generations are beside {file}; {AGAIN}")
         score = tune_linear(task, trials, file, shown=typer.echo)
         typer.echo(
             f"best: {score:.2f}, written to {file}; keep it by: python -m {__package__} ship {file} --replace"
@@ -334,12 +336,14 @@ def reference(
     file = FILE if out is None else out
     keep(f"finished tasks are in {file}; {AGAIN}")
     kept = read_references(file)
+    require_writable(file.parent)
     wanted = [each for each in tasks_in(task or ["Heading"]) if again or each not in kept]
     with worker_pool(processes) as pool:
-        begun = {
-            pool.submit(find_reference, each, episodes, f"python -m {__package__} reference --task {each} --again"): each
-            for each in wanted
-        }  # fmt: skip
+        with uninterrupted():
+            begun = {
+                pool.submit(find_reference, each, episodes, f"python -m {__package__} reference --task {each} --again"): each
+                for each in wanted
+            }  # fmt: skip
         for future in as_completed(begun):
             found, name = future.result(), begun[future]
             write_reference(file, name, found)
@@ -388,14 +392,15 @@ def dataset(
     seed: Annotated[int, Option(help="Seed of a training: the episodes are of its environment seeds.")] = 0,
     out: Annotated[Path, Option(help="Folder of Minari's datasets.")] = Path("datasets"),
 ) -> None:  # fmt: skip
-    """Write datasets for offline reinforcement learning in Minari's format: leanyaw/TASK/KIND-v1."""
+    """Write datasets for offline reinforcement learning in Minari's format: leanyaw/TASK/KIND-v1. Those that are there already stay."""
     from .datasets import KINDS, make_dataset
 
+    keep(f"finished datasets are in {out}; {AGAIN}")
     kinds = names_in([kind])
     for each in tasks_in(task or ["Heading"]):
         for one in KINDS if ALL in kinds else kinds:
             name = make_dataset(each, one, out, expert=expert, episodes=episodes, seed=seed)  # pyright: ignore[reportArgumentType]
-            typer.echo(f"written: {name} in {out}")
+            typer.echo(f"{name} is in {out}")
 
 
 @_command("closed-loop")
@@ -415,6 +420,8 @@ def closed_loop(
     from .evaluation.closed_loop_page import show, write_report
     from .evaluation.closed_loop_report import examine, examine_agents, plain
 
+    if out is not None:
+        require_writable(out)
     examined = partial(examine, points=points, starts=starts, directions=directions)
     reports, notes = examine_agents(
         tasks_in(task or ["Heading"]), names_in([agents]), examined, path=agent_path, runs=runs
@@ -445,6 +452,8 @@ def capture(
     from .evaluation.capture import examine_capture, show, write_captures
     from .evaluation.closed_loop_report import examine_agents
 
+    if out is not None:
+        require_writable(out)
     reports, notes = [], {}
     for limit in friction_limit or [None]:
         examined = partial(examine_capture, friction_limit=limit, starts=starts, points=points)

@@ -13,14 +13,16 @@ from tqdm import trange
 import lean_yaw_env
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.extras import needs_extra
-from lean_yaw_env.validation import require_choice, require_count
+from lean_yaw_env.files import read_json, require_path, scratch
+from lean_yaw_env.validation import require_choice, require_count, require_flag
 
 from .agent import Agent, State, attach
-from .registry import AgentRequest, env_id_of, make_agent
+from .registry import AGENTS, AgentRequest, env_id_of, make_agent
 from .seeds import MOST_WALKERS, training_seed
 
 Kind = Literal["expert", "medium", "random", "mixed"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+_PLACE = "MINARI_DATASETS_PATH"
 MEDIUM_NOISE = 0.5
 """Standard deviation of what is added to each action of the expert; actions reach from -1 to 1."""
 
@@ -35,14 +37,14 @@ def make_dataset(
     seed: int = 0,
     progress: bool = True,
 ) -> str:
-    """Write a dataset into a folder; return its id, "leanyaw/<task>/<kind>-v<version>".
+    """Write a dataset into a folder, whole or not at all; return its id, "leanyaw/<task>/<kind>-v<version>". One of the same episodes stays as it is.
 
     Parameters
     ----------
     task : a task's name
     kind : "expert" is a shipped agent, the first of its trainings; "medium" is the same with noise of ``MEDIUM_NOISE`` on every action; "random" draws
         actions evenly; of "mixed", every third episode is one of each
-    out : folder of Minari's datasets, ``MINARI_DATASETS_PATH``
+    out : folder of Minari's datasets, which ``MINARI_DATASETS_PATH`` is set to
     expert : an agent's name
     episodes : 1 to ``MOST_WALKERS``
     seed : of a training; the episodes are of its environment seeds, so that none is a validation's or a test's
@@ -50,30 +52,48 @@ def make_dataset(
     Raises
     ------
     ValueError
-        If an argument is bad, the agent is not for the task, or the dataset is there already.
+        If an argument is bad, the agent is not for the task, or there is something else in the dataset's place.
     gymnasium.error.DependencyNotInstalled
         If Minari is not installed.
     """
     require_choice("kind", kind, KINDS)
+    require_choice("expert", expert, AGENTS)
+    require_path(out, "out")
+    require_flag("progress", progress)
     require_count("episodes", episodes, 1, MOST_WALKERS)
     env_id, first = env_id_of(task), training_seed(seed)
     agent = make_agent(expert, AgentRequest(env_id, EnvOptions(), runs=None))
     with needs_extra("compat"):
         import minari  # pyright: ignore[reportMissingImports]
-    out.mkdir(parents=True, exist_ok=True)
-    os.environ["MINARI_DATASETS_PATH"] = str(out.absolute())
+        from minari import namespace as namespaces  # pyright: ignore[reportMissingImports]
     name = f"leanyaw/{task.lower()}/{kind}-v{env_id.rpartition('-v')[2]}"
-    recorder = minari.DataCollector(gym.make(env_id), record_infos=False)
-    cycle = ("random", "medium", "expert") if kind == "mixed" else (kind,)
-    for k in trange(episodes, desc=name, unit="episode", disable=not progress):
-        _record(recorder, agent, cycle[k % len(cycle)], first + k)
-    recorder.create_dataset(
-        dataset_id=name,
-        algorithm_name=expert if kind == "expert" else f"{kind} ({expert})",
-        description=f"{episodes} episodes of {env_id}, {kind}; environment seeds from {first} on.",
-        code_permalink=f"lean-yaw-env {lean_yaw_env.__version__}",
+    algorithm = expert if kind == "expert" else f"{kind} ({expert})"
+    description = (
+        f"{episodes} episodes of {env_id}, {algorithm}; environment seeds from {first} on."
     )
-    recorder.close()
+    place = out.absolute() / name
+    if place.exists():
+        if read_json(place / "data" / "metadata.json").get("description") != description:
+            raise ValueError(f"{str(place)!r} holds another dataset; remove it or name another folder")  # fmt: skip
+        return name
+    with scratch(out.absolute()) as folder:
+        os.environ[_PLACE] = str(folder)
+        recorder = minari.DataCollector(gym.make(env_id), record_infos=False)
+        cycle = ("random", "medium", "expert") if kind == "mixed" else (kind,)
+        for k in trange(episodes, desc=name, unit="episode", disable=not progress):
+            _record(recorder, agent, cycle[k % len(cycle)], first + k)
+        recorder.create_dataset(
+            dataset_id=name,
+            algorithm_name=algorithm,
+            description=description,
+            code_permalink=f"lean-yaw-env {lean_yaw_env.__version__}",
+        )
+        recorder.close()
+        os.environ[_PLACE] = str(out.absolute())
+        namespace = name.rpartition("/")[0]
+        if namespace not in namespaces.list_local_namespaces():
+            namespaces.create_namespace(namespace)
+        (folder / name).rename(place)
     return name
 
 

@@ -11,7 +11,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from lean_yaw_env.files import read_json
+from lean_yaw_env.files import read_json, require_path
+from lean_yaw_env.registration import ALL_TASKS
+from lean_yaw_env.validation import require_choice, require_finite, require_shape, require_text
 
 FILE = Path(__file__).with_name("references.json")
 
@@ -52,10 +54,23 @@ class Reference:
     seconds: float
     command: str
 
+    def __post_init__(self) -> None:
+        for name in ("metric", "found_by", "base"):
+            require_text(name, getattr(self, name))
+        for name in ("fixed", "value", "standard_error", "base_value", "seconds"):
+            require_finite(name, getattr(self, name))
+
 
 def normalised(task: str, value: float) -> float | None:
-    """A value of the task's headline as a share of the way from the fixed controller to the reference; None for a task without a reference."""
-    found = references().get(task)
+    """A value of the task's headline as a share of the way from the fixed controller to the reference; None for a task without a reference.
+
+    Raises
+    ------
+    ValueError
+        If there is no such task, or the value is no number.
+    """
+    found = references().get(require_choice("task", task, ALL_TASKS))
+    require_shape("value", value, ())
     return None if found is None else (value - found.fixed) / (found.value - found.fixed)
 
 
@@ -66,6 +81,9 @@ def references() -> dict[str, Reference]:
 
 
 def read_references(file: Path) -> dict[str, Reference]:
-    """The references of a file, by task; none if there is no file."""
-    found: Any = read_json(file) if file.exists() else {}
-    return {task: Reference(**values) for task, values in found.items()}
+    """The references of a file, by task; none if there is no file, and ``ValueError`` if it holds something else."""
+    found: Any = read_json(file) if require_path(file, "file").exists() else {}
+    try:
+        return {task: Reference(**values) for task, values in found.items()}
+    except (AttributeError, TypeError, ValueError) as error:
+        raise ValueError(f"{str(file)!r} holds no references: {error}") from error

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lean_yaw_env.envs.options import EnvOptions
-from lean_yaw_env.files import locked, read_json, write_json
+from lean_yaw_env.files import locked, read_json, scratch, write_json
 from lean_yaw_env.registration import ALL_ENV_IDS, NAMESPACE
 from lean_yaw_env.validation import require_choice
 
@@ -102,13 +102,14 @@ def retrain(
 
 
 def _begin(folder: Path, trainings: Sequence[Training]) -> None:
-    """Make a series' folder, or check that the one there is of these trainings."""
-    if not is_series(folder):
-        shutil.rmtree(folder, ignore_errors=True)  # of a process that was ended in the midst
-        make_series(trainings, folder)
-    elif [read_run(run) for run in runs_of(folder).values()] != trainings:
+    """Make a series' folder, whole or not at all, or check that the one there is of these trainings."""
+    if not folder.exists():
+        with scratch(folder.parent) as place:
+            make_series(trainings, place / folder.name)
+            (place / folder.name).rename(folder)
+    elif not is_series(folder) or [*map(read_run, runs_of(folder).values())] != trainings:
         raise ValueError(
-            f"{str(folder)!r} holds trainings with other settings; remove it or name another folder"
+            f"{str(folder)!r} holds no trainings, or some with other settings; remove it or name another folder"
         )
 
 

@@ -50,7 +50,7 @@ napoleon_numpy_docstring, napoleon_google_docstring = True, False
 
 # Formulas without a network: of the package with MathJax only what draws them is copied
 MATHJAX = Path(find_spec("sphinx-mathjax-offline").origin).parent / "static" / "mathjax"
-mathjax_path = "mathjax/tex-chtml.js"
+mathjax_path = "mathjax/tex-chtml-full.js"
 
 html_theme = "furo"
 html_title = "lean_yaw_env"
@@ -99,7 +99,7 @@ def _copy(app: Sphinx, error: Exception | None) -> None:
             out / "_static" / "mathjax" / "output" / "chtml" / "fonts" / "woff-v2",
             dirs_exist_ok=True,
         )
-        shutil.copy(MATHJAX / "tex-chtml.js", out / "_static" / mathjax_path)
+        shutil.copy(MATHJAX / "tex-chtml-full.js", out / "_static" / mathjax_path)
 
 
 def setup(app: Sphinx) -> None:

@@ -14,6 +14,7 @@ from uuid import uuid4
 
 from lean_yaw_env.errors import ClusterError
 from lean_yaw_env.extras import needs_extra
+from lean_yaw_env.reporting import uninterrupted
 from lean_yaw_env.threads import MOST_THREADS
 from lean_yaw_env.validation import require_count, require_text
 
@@ -103,9 +104,10 @@ class Engine:
 
     def _client(self, distributed: Any) -> Any:
         if self.workers is not None:
-            return distributed.Client(
-                n_workers=self.workers, threads_per_worker=1, memory_limit=0, dashboard_address=":0"
-            )
+            with uninterrupted():  # workers, and those that take their places
+                return distributed.Client(
+                    n_workers=self.workers, threads_per_worker=1, memory_limit=0, dashboard_address=":0"
+                )  # fmt: skip
         try:
             return distributed.Client(self.scheduler, timeout=_PATIENCE)
         except (OSError, ValueError, TypeError) as error:

@@ -8,7 +8,9 @@ import math
 import os
 import platform
 import secrets
+import shutil
 import stat
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -52,15 +54,38 @@ def written_whole(path: Path) -> Iterator[Path]:
 
     What processes that were killed left in that folder while they wrote such files is removed first.
     """
-    _remove_leftovers(path.parent)
-    name = f"{_PREFIX}{os.getpid()}-{secrets.token_hex(4)}-{platform.node()}{path.suffix}"
-    temporary = path.parent / name
+    temporary = _temporary(path.parent, path.suffix)
     temporary.touch(exist_ok=False)
     try:
         yield temporary
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def scratch(folder: Path) -> Iterator[Path]:
+    """A temporary folder in ``folder``, for what is to be moved when it is complete; removed at the end of the block, or by the next process if this one is killed."""
+    require_writable(folder)
+    temporary = _temporary(folder)
+    temporary.mkdir()
+    try:
+        yield temporary
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def require_writable(folder: Path) -> None:
+    """Make a folder if there is none, and raise ``OSError`` unless files can be written there: to be called before long work, not after it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=folder):
+        pass
+
+
+def _temporary(folder: Path, ending: str = "") -> Path:
+    """A new name in a folder, from which leftovers of processes that no longer run are removed."""
+    _remove_leftovers(folder)
+    return folder / f"{_PREFIX}{os.getpid()}-{secrets.token_hex(4)}-{platform.node()}{ending}"
 
 
 def write_text(path: Path, text: str) -> None:
@@ -167,7 +192,7 @@ def _remove_leftovers(folder: Path) -> None:
             is_old = time.time() - left.stat().st_mtime > _LONGEST_WRITE
             is_written = writer.isdigit() and is_running(int(writer)) if is_own else not is_old
             if not is_written:
-                left.unlink()
+                shutil.rmtree(left) if left.is_dir() else left.unlink()
 
 
 def is_running(process: int) -> bool:

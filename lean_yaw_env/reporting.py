@@ -18,15 +18,17 @@ from lean_yaw_env.errors import LeanYawError
 
 WRONG_INPUT, NO_RESULT = 2, 1
 """Exit statuses for a bad value or file, and for work without a result."""
+NOTHING = "nothing is kept"
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
-_PATIENCE = 1.0  # seconds from a signal to the end of a process that does not end by itself
+_PATIENCE = 0.8  # seconds from a signal to the end of child processes that do not end by themselves
+_LAST = 0.4  # seconds from there to the end of this process
 
 
 class _State:
     """Of the running command: the signal that has interrupted it, what it says then, and whether it has."""
 
     number: int | None = None
-    kept = ""
+    kept = NOTHING
     is_said = False
 
 
@@ -39,7 +41,7 @@ def keep(words: str) -> None:
 def reporting(program: str) -> Iterator[None]:
     """Report errors and interruptions within the block in a line that begins with ``program``, and exit.
 
-    A process that does not end within a second of Ctrl-C or SIGTERM, because compiled code or another process is at work, is ended by
+    A process that does not end soon after Ctrl-C or SIGTERM, because compiled code or another process is at work, is ended by
     force, with its child processes. Only the main thread can see to that; a block within a block adds nothing.
     """
     try:
@@ -49,6 +51,8 @@ def reporting(program: str) -> Iterator[None]:
         if _State.number is None and isinstance(end, SystemExit):
             raise
         _say_interrupted(program)
+        # Python exits otherwise than asked if the signal came while it executed text, as namedtuple does, until it executes some again
+        exec("")
         raise SystemExit(128 + (_State.number or signal.SIGINT)) from end
     except BrokenPipeError:
         raise
@@ -69,11 +73,7 @@ def _fail(program: str, message: str, status: int, error: Exception) -> NoReturn
 def _say_interrupted(program: str) -> None:
     if not _State.is_said:
         _State.is_said = True
-        print(
-            f"{program}: interrupted{_State.kept and '; '}{_State.kept}",
-            file=sys.stderr,
-            flush=True,
-        )
+        print(f"{program}: interrupted; {_State.kept}", file=sys.stderr, flush=True)
 
 
 @contextlib.contextmanager
@@ -96,7 +96,7 @@ def _watched(program: str) -> Iterator[None]:
     if not is_main or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
         yield
         return
-    _State.number, _State.kept, _State.is_said = None, "", False
+    _State.number, _State.kept, _State.is_said = None, NOTHING, False
     reader, writer = socket.socketpair()
     writer.setblocking(False)
     before = {number: signal.signal(number, _interrupt) for number in _SIGNALS}
@@ -135,6 +135,6 @@ def _end_after_signal(reader: socket.socket, program: str) -> None:
         time.sleep(_PATIENCE)
         for child in multiprocessing.active_children():
             child.kill()
-        time.sleep(_PATIENCE / 2)  # what waited for them ends now
+        time.sleep(_LAST)  # what waited for them ends now
         _say_interrupted(program)
         os._exit(128 + number[0])

@@ -54,10 +54,15 @@ def test_many_laws_walk_as_each_would_alone():
         np.testing.assert_array_equal(law.predict(observation)[0], action)
 
 
-def test_a_search_finds_no_worse_a_law_than_it_began_with(tmp_path, monkeypatch):
+@pytest.fixture
+def short(monkeypatch):
+    """Searches of a moment."""
     monkeypatch.setattr(linear, "_LONGEST", 20.0)
     monkeypatch.setattr(linear, "EPISODES", 4)
     monkeypatch.setattr(linear, "_VALIDATION_EPISODES", 16)
+
+
+def test_a_search_finds_no_worse_a_law_than_it_began_with(short, tmp_path):
     lines: list[str] = []
     found, score = search_linear("Heading", 5, shown=lines.append)
     starts = [float(part.split()[-1]) for part in lines[0].split(",")]
@@ -66,6 +71,31 @@ def test_a_search_finds_no_worse_a_law_than_it_began_with(tmp_path, monkeypatch)
     assert tune_linear("Heading", 5, tmp_path / "law.json", shown=lines.append) == score
     record = json.loads((tmp_path / "law.json").read_text())
     assert record["values"] == {"weights": list(found.weights)}
+
+
+def test_a_search_that_was_ended_goes_on_to_the_same_law_bit_for_bit(short, tmp_path, monkeypatch):
+    alone = search_linear("Heading", 5, shown=lambda line: None)
+    walked, file, worth = [], tmp_path / "kept.json", linear._worth
+
+    def ended(*arguments):
+        walked.append(arguments[2])
+        if len(walked) == 3:
+            raise KeyboardInterrupt
+        return worth(*arguments)
+
+    monkeypatch.setattr(linear, "_worth", ended)
+    with pytest.raises(KeyboardInterrupt):
+        search_linear("Heading", 5, file=file, shown=lambda line: None)
+    assert search_linear("Heading", 5, file=file, shown=lambda line: None) == alone
+    assert len(walked) == 6 and len(set(walked)) == 5  # none again but the one that was under way
+
+
+@pytest.mark.parametrize("words", ["{}", "[1]", "dear", '{"question": {"task": "Slalom"}}'])
+def test_a_file_that_holds_another_search_is_refused_and_stays(words, short, tmp_path):
+    (tmp_path / "law.search.json").write_text(words)
+    with pytest.raises(ValueError, match=r"law\.search\.json"):
+        tune_linear("Heading", 1, tmp_path / "law.json", shown=lambda line: None)
+    assert (tmp_path / "law.search.json").read_text() == words
 
 
 def test_laws_that_come_with_the_package_are_of_its_tasks():

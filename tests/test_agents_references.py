@@ -14,7 +14,7 @@ from agents.controllers.mpc import MpcSettings
 from agents.evaluation import reference_search
 from agents.evaluation.episodes import direction
 from agents.evaluation.reference_search import find_reference, write_reference
-from agents.references import normalised, read_references, references
+from agents.references import Reference, normalised, read_references, references
 from agents.seeds import first_seed
 from agents.settings import with_values
 from lean_yaw_env.envs.tasks import task_named
@@ -65,3 +65,33 @@ def test_the_command_goes_on_with_the_tasks_that_are_missing(short, tmp_path, mo
     result = CliRunner().invoke(app, ["reference", "--task", "Heading", "--out", str(file)])
     assert result.exit_code == 0, result.output
     assert read_references(file)["Heading"].value == found.value
+
+
+@pytest.mark.parametrize("words", ['{"Heading": {"value": 1}}', "[1, 2]", '{"Heading": 3}', "dear"])
+def test_a_file_of_something_else_is_refused_and_stays(words, tmp_path):
+    file = tmp_path / "mine.json"
+    file.write_text(words)
+    result = CliRunner().invoke(app, ["reference", "--task", "Heading", "--out", str(file)])
+    assert result.exit_code == 2
+    assert str(file) in result.stderr and len(result.stderr.splitlines()) == 1
+    assert file.read_text() == words
+
+
+def test_a_damaged_number_of_a_reference_is_refused():
+    found = asdict(next(iter(references().values())))
+    for name, value in {
+        "value": None,
+        "fixed": "3",
+        "standard_error": math.nan,
+        "base": "",
+    }.items():
+        with pytest.raises(ValueError, match=f"{name} must be"):
+            Reference(**found | {name: value})
+
+
+def test_a_place_that_cannot_be_written_is_named_before_the_search(tmp_path, monkeypatch):
+    monkeypatch.setattr(reference_search, "find_reference", None)
+    (tmp_path / "file").touch()
+    file = tmp_path / "file" / "references.json"
+    result = CliRunner().invoke(app, ["reference", "--task", "Heading", "--out", str(file)])
+    assert result.exit_code == 2 and "file" in result.stderr

@@ -259,8 +259,16 @@ def test_agents_of_the_package_are_trained_anew_by_one_command_that_goes_on(tmp_
     assert list((tmp_path / "trained" / "Walk-v1" / "ppo").iterdir()) != []
     rows = [json.loads((place / "evaluation.json").read_text()) for place in shipped]
     assert all({row["agent"] for row in each} == {"ppo"} for each in rows)
-    with pytest.raises(ValueError, match="trainings with other settings"):
+    with pytest.raises(ValueError, match="other settings"):
         list(retrain(["Walk"], ["ppo"], out, choices={"steps": 8192}))
+
+
+def test_training_anew_leaves_a_folder_that_is_no_training_as_it_is(tmp_path):
+    (tmp_path / "Walk-ppo").mkdir()
+    (tmp_path / "Walk-ppo" / "letter.txt").write_text("dear")
+    with pytest.raises(ValueError, match=r"Walk-ppo.*holds no trainings"):
+        list(retrain(["Walk"], ["ppo"], tmp_path, choices={"steps": 4096}))
+    assert (tmp_path / "Walk-ppo" / "letter.txt").read_text() == "dear"
 
 
 def make_damaged(folder: Path, choices: dict) -> list[Path]:

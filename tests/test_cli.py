@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -384,4 +385,8 @@ def test_a_large_map_says_what_it_costs_and_one_beyond_memory_is_refused(
     assert "threads must be from 1 to 1024, got 0" in result.output
     result = runner.invoke(app, ["map", "slope=0.005:0.05:100000", "hip_width=0.1:0.5:100000"])
     assert result.exit_code == 2
-    assert "10,000,000,000, which take about" in result.output
+    said = result.output.replace("\n", " ")
+    cost = re.search(r"10,000,000,000 points: about (\S+) GB and (\S+) minutes of one core", said)
+    assert cost is not None
+    assert float(cost[1]) > 1e3 and float(cost[2]) > 1e3
+    assert "10,000,000,000, which take about" in said and ".zarr" in said

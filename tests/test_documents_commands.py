@@ -13,43 +13,40 @@ from typer.testing import CliRunner
 
 from agents.command_line import app as agents_app
 from lean_yaw_env.cli.app import app as walker_app
-from train import app as train_app
 
 from .test_documents import COMMAND, DOCS, FENCED, PAGES, ROOT
 
 APPS: dict[str, typer.Typer] = {
     "lean-yaw": walker_app,
     "python -m agents": agents_app,
-    "python train.py": train_app,
 }
 
 SHORT = {
-    "python train.py": "--steps 64 --episodes 1",
-    "python -m agents evaluate": "--agents fixed --episodes 2 --costly-episodes 1 --processes 1",
-    "python -m agents retrain": "--task Heading --algorithm ppo --steps 64 --episodes 1 --jobs 1",
     "python -m agents robustness": "--agents fixed --episodes 1 --processes 1",
     "python -m agents closed-loop": "--agents fixed --points 5 --starts 16 --directions 4",
-    "python -m agents capture": "--agents fixed --points 5 --starts 16",
-    "python -m agents film": "--seconds 0.3",
-    "python -m agents tune lqr": "--trials 1 --episodes 1 --horizon 5",
-    "python -m agents tune ppo": "--trials 1 --episodes 1 --steps 64",
+    "python -m agents capture": "--agents fixed --starts 8 --points 3",
+    "python -m agents film": "--seconds 0.5",
 }
 """Options that make a command short: in place of the values that it gives, or beside them."""
-OTHER_VALUES = {"--seeds": {"0-4": "0-1"}, "--task": {"all": "Walk"}}
-"""Values in place of others. Of several tasks the first is taken."""
 
 ELSEWHERE = {
-    r"python train\.py .*--resume": "test_agents_training.py: --resume",
+    r"python train\.py .*--seeds": "test_agents_series.py: --seeds",
+    r"python train\.py .*--algorithm her": 'test_agents_her.py: algorithm="her"',
+    r"python train\.py .*--algorithm sac": 'test_agents_sac.py: algorithm="sac"',
+    r"python train\.py .*--algorithm apg": 'test_agents_gradient.py: train("apg"',
+    r"python train\.py": "test_agents_training.py: --resume",
+    r"python -m agents evaluate .*--out": "test_agents_entries.py: --results",
+    r"python -m agents evaluate": "test_agents_training.py: --agent-path",
     r"python -m agents dataset": 'compat/test_datasets.py: ["dataset"',
-    r"python -m agents (ship|retrain .*--ship)": "test_agents_series.py: shipped",
+    r"python -m agents (ship|retrain)": "test_agents_series.py: shipped",
     r"python -m agents reference": "test_agents_references.py: reference",
     r"python -m agents tune linear": "test_agents_linear.py: tune_linear",
-    r".*my_agent|.*my_ppo": "test_agents_entries.py: --results",
+    r"python -m agents tune": "test_agents_tuning.py: trials",
     r"lean-yaw view": "test_web_server.py: walk",
     r"lean-yaw play": "test_cli.py: play",
     r"lean-yaw findings": "test_findings.py: write_findings",
     r"lean-yaw reproduce": "test_cli.py: reproduce",
-    r"lean-yaw atlas": "test_atlas.py: basin_sizes",
+    r"lean-yaw atlas": "test_documents.py: atlas",
     r"lean-yaw map .*--scheduler": "test_engine.py: --scheduler",
     r"python -m lean_yaw_env.compile": "test_compile.py: compile_all",
     r"python -m benchmarks\.gradient": "test_gradient_benchmark.py: gradient",
@@ -74,13 +71,11 @@ def _commands() -> list[str]:
 
 
 def _short(command: str) -> list[str]:
-    """The words of a command whose options say: do little."""
+    """The words of a command with options that make it short, and with its first task only."""
     words = shlex.split(command)
-    for option, values in OTHER_VALUES.items():
-        if option in words:
-            k = words.index(option) + 1
-            first = words[k].split(",")[0]
-            words[k] = values.get(first, first)
+    if "--task" in words:
+        k = words.index("--task") + 1
+        words[k] = words[k].split(",")[0].replace("all", "Walk")
     prefix = max((each for each in SHORT if command.startswith(each)), key=len, default="")
     given = shlex.split(SHORT.get(prefix, ""))
     for option, value in zip(given[::2], given[1::2], strict=True):

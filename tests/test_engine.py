@@ -217,6 +217,47 @@ def test_a_store_of_another_map_or_of_other_things_is_refused(tmp_path: Path) ->
     assert (tmp_path / "mine" / "letter.txt").read_text() == "dear"
 
 
+def test_a_map_beyond_memory_is_computed_where_it_is_streamed(tmp_path, monkeypatch) -> None:
+    axes = {"slope": np.linspace(0.01, 0.02, 30)}
+    whole = stability_map(WALKER, axes)
+    monkeypatch.setattr("lean_yaw_env.analysis.storage.free_memory", lambda: 1000.0)
+    for path in (None, tmp_path / "map.nc"):
+        with pytest.raises(ValueError, match=r"fit into memory, got 30, .*\.zarr"):
+            stability_map(WALKER, axes, path=path)
+    assert stability_map(WALKER, axes, path=tmp_path / "map.zarr").equals(whole)
+
+
+STREAMED = """
+import resource, sys
+import numpy as np
+from lean_yaw_env.analysis import Engine, filling
+from lean_yaw_env.cli.records import grid_summary
+
+COLUMNS = ("speed", "spectral_radius", "step_length", "step_duration")
+
+def work(arrays, region, number):
+    n = filling.points_of(region, tuple(s.stop for s in region)).size
+    filling.write_box(arrays, region, {name: np.zeros(n) for name in COLUMNS})
+    return 0
+
+for n in map(int, sys.argv[2:]):
+    axes = {"slope": np.arange(n / 1024), "hip_width": np.arange(1024.0)}
+    layout = filling.Layout("map", axes, {name: np.full(1, np.nan) for name in COLUMNS}, {})
+    data = filling.fill_grid(layout, work, f"{sys.argv[1]}/{n}.zarr", Engine(), False)
+    assert grid_summary(data, "gait", ("speed",))["counts"] == {"stable": n}
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="kilobytes are Linux's unit")
+def test_memory_does_not_grow_with_the_points_of_a_streamed_map(tmp_path: Path) -> None:
+    sizes = 2**21, 2**23
+    command = [sys.executable, "-c", STREAMED, str(tmp_path), *map(str, sizes)]
+    said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    less, more = (1024 * int(line) for line in said.split())
+    assert more - less < 0.1 * 32 * (sizes[1] - sizes[0])  # a tenth of four numbers a point
+
+
 def test_a_store_may_be_in_an_object_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("s3fs")
     server = pytest.importorskip("moto.server").ThreadedMotoServer(ip_address="127.0.0.1", port=0)

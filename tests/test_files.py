@@ -15,6 +15,8 @@ from lean_yaw_env.files import (
     read_json,
     read_regular,
     require_ending,
+    require_writable,
+    scratch,
     write_text,
     written_whole,
 )
@@ -150,3 +152,33 @@ def test_a_path_that_cannot_be_written_is_refused(tmp_path: Path, name: str) -> 
     with pytest.raises(ValueError, match="path must"):
         require_ending(tmp_path / name, (".png",))
     assert require_ending(tmp_path / "picture.PNG", (".png",)).name == "picture.PNG"
+
+
+def test_a_scratch_folder_is_removed_at_the_end_and_by_the_next_process_if_its_own_is_killed(
+    tmp_path: Path,
+) -> None:
+    with scratch(tmp_path / "new") as folder:
+        (folder / "part").write_text("half")
+        (folder / "whole").mkdir()
+        (folder / "whole").rename(tmp_path / "new" / "whole")
+    assert [each.name for each in (tmp_path / "new").iterdir()] == ["whole"]
+    code = (
+        "import os; from pathlib import Path; from lean_yaw_env.files import scratch\n"
+        f"with scratch(Path({str(tmp_path)!r})) as folder:\n"
+        "    (folder / 'part').write_text('half')\n"
+        "    os._exit(9)\n"
+    )
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 9
+    assert len(list(tmp_path.glob(".partial-*"))) == 1
+    with scratch(tmp_path) as folder:
+        assert list(tmp_path.glob(".partial-*")) == [folder]
+    assert not list(tmp_path.glob(".partial-*"))
+
+
+def test_a_place_where_nothing_can_be_written_is_named_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    for place in (tmp_path / "file", tmp_path / "file" / "folder"):
+        with pytest.raises(OSError, match="file"):
+            require_writable(place)
+    require_writable(tmp_path / "new" / "folder")
+    assert not list((tmp_path / "new" / "folder").iterdir())

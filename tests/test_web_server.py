@@ -116,7 +116,10 @@ def test_what_the_page_cannot_show_is_refused(tmp_path):
     with pytest.raises(ValueError, match="give task too"):
         PageServer(agents=["ppo"])
     with pytest.raises(FileNotFoundError, match=r"no policy\.json in"):
-        PageServer(policy=tmp_path)
+        PageServer(policy=tmp_path, task="Slalom")
+    agents.save(agents.load("LeanYaw/Slalom-v1"), tmp_path)
+    with pytest.raises(ValueError, match="is for Slalom, and task is 'Walk'"):
+        PageServer(policy=tmp_path, task="Walk")
     agents.save(agents.load("LeanYaw/WaypointGoal-v1"), tmp_path)
     with pytest.raises(ValueError, match="is for LeanYaw/WaypointGoal-v1"):
         PageServer(policy=tmp_path)

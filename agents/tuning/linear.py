@@ -7,7 +7,9 @@ comes to is compared on validation episodes with the law that it began with, whi
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from cmaes import CMA
@@ -15,7 +17,7 @@ from cmaes import CMA
 from lean_yaw_env.envs.options import EnvOptions
 from lean_yaw_env.envs.tasks import task_named
 from lean_yaw_env.envs.vector_env import WalkerVectorEnv
-from lean_yaw_env.files import write_json
+from lean_yaw_env.files import read_json, require_writable, write_json
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.validation import require_count
 
@@ -37,22 +39,56 @@ _LONGEST = 300.0  # time units of an episode
 _CHECKS = 5  # times that the law is compared
 
 
+class _Kept:
+    """Results of a search by their names, in a file: a search that begins again reads them up to where it ended, and comes to what it would have come to."""
+
+    def __init__(self, file: Path | None, question: Any) -> None:
+        self._file, self._found = file, {"question": question}
+        if file is not None and file.exists():
+            self._found = read_json(file)
+            if not isinstance(self._found, dict) or self._found.get("question") != question:
+                raise ValueError(f"{str(file)!r} holds no search, or another one; remove it or name another file")  # fmt: skip
+
+    def __call__(self, name: str, compute: Callable[[], Any]) -> Any:
+        if name not in self._found:
+            self._found[name] = compute()
+            if self._file is not None:
+                write_json(self._file, self._found, indent=None)
+        return self._found[name]
+
+
 def search_linear(
-    task: str, generations: int = GENERATIONS, *, shown: Callable[[str], object] = print
+    task: str,
+    generations: int = GENERATIONS,
+    *,
+    file: Path | None = None,
+    shown: Callable[[str], object] = print,
 ) -> tuple[LinearSettings, float]:
     """The best law found and its mean return on validation episodes, at least that of the package's law and of laws that imitate other agents.
 
     Parameters
     ----------
     generations : 1 to 100,000
+    file : keeps what each generation comes to; a search that was ended goes on with it
     shown : takes a line at each comparison
+
+    Raises
+    ------
+    ValueError
+        If an argument is bad, or the file holds something else.
     """
     require_count("generations", generations, 1, 100_000)
     law = LinearLaw(task)
     shape = law.matrix.shape
     options = EnvOptions(horizon=_horizon(task))
     starts = {"the package's law": law.matrix.ravel()} | _imitations(task, options)
-    scores = {name: _mean_return(task, options, _law(task, each)) for name, each in starts.items()}
+    question = {"task": task, "episodes": EPISODES, "starts": {name: each.tolist() for name, each in starts.items()}}  # fmt: skip
+    kept = _Kept(file, question)
+
+    def score_of(name: str, weights: Vector) -> float:
+        return kept(f"score {name}", lambda: _mean_return(task, options, _law(task, weights)))
+
+    scores = {name: score_of(name, each) for name, each in starts.items()}
     best = max(scores.values())
     found = starts[max(scores, key=lambda name: scores[name])]
     shown("start: " + ", ".join(f"{name} {score:.2f}" for name, score in scores.items()))
@@ -61,13 +97,11 @@ def search_linear(
         tried = np.stack([search.ask() for _ in range(POPULATION)])
         law.matrix = np.repeat(tried.reshape(POPULATION, *shape), EPISODES, axis=0)
         first = training_seed(_SEED + generation)
-        seeds = [*range(first, first + EPISODES)] * POPULATION
-        returns = run_seeds(law, task, seeds, options=options).metrics["return"]
-        worth = returns.reshape(POPULATION, EPISODES).mean(axis=1)
-        search.tell([(each, -float(w)) for each, w in zip(tried, worth, strict=True)])
+        worth = kept(f"generation {generation}", partial(_worth, law, task, first, options))
+        search.tell([(each, -w) for each, w in zip(tried, worth, strict=True)])
         if (generation + 1) % max(1, generations // _CHECKS) == 0:
-            score = _mean_return(task, options, _law(task, search.mean))
-            shown(f"generation {generation + 1}: training {worth.mean():.2f}, validation {score:.2f}")  # fmt: skip
+            score = score_of(f"after generation {generation}", search.mean)
+            shown(f"generation {generation + 1}: training {np.mean(worth):.2f}, validation {score:.2f}")  # fmt: skip
             if score > best:
                 best, found = score, search.mean.copy()
     return _settings(found), best
@@ -76,12 +110,20 @@ def search_linear(
 def tune_linear(
     task: str, generations: int, file: Path, *, shown: Callable[[str], object] = print
 ) -> float:
-    """Search for a law, write it as ``shipping.ship`` takes it, and return its mean return."""
-    found, score = search_linear(task, generations, shown=shown)
-    file.parent.mkdir(parents=True, exist_ok=True)
+    """Search for a law, write it as ``shipping.ship`` takes it, and return its mean return. What the search comes to is kept beside it, in ``.search.json``."""
+    require_writable(file.parent)
+    kept = file.with_suffix(".search.json")
+    found, score = search_linear(task, generations, file=kept, shown=shown)
     values = {"weights": list(found.weights)}
     write_json(file, {"agent": "linear", "task": task, "score": score, "values": values})
     return score
+
+
+def _worth(law: Agent, task: str, first: int, options: EnvOptions) -> list[float]:
+    """Mean return of each law of a generation, over episodes from a seed on."""
+    seeds = [*range(first, first + EPISODES)] * POPULATION
+    returns = run_seeds(law, task, seeds, options=options).metrics["return"]
+    return returns.reshape(POPULATION, EPISODES).mean(axis=1).tolist()
 
 
 def _horizon(task: str) -> float:

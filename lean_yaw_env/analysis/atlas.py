@@ -18,7 +18,14 @@ from lean_yaw_env.engine import ONE_THREAD, Engine
 from lean_yaw_env.errors import NoGaitError
 from lean_yaw_env.kernel.records import STEPPED, Outcome
 from lean_yaw_env.parameters import STATE_SIZE, Vector
-from lean_yaw_env.validation import require_choice, require_count, require_instance, require_number
+from lean_yaw_env.validation import (
+    require_choice,
+    require_count,
+    require_finite,
+    require_instance,
+    require_number,
+    require_pair,
+)
 from lean_yaw_env.walker import Walker
 
 if TYPE_CHECKING:
@@ -74,7 +81,7 @@ def basin_sizes(
     ValueError
         If an argument is outside its range, or the store holds another result.
     """
-    require_instance("gaits", gaits, labelled().Dataset)
+    _with("spectral_radius", "gaits", gaits)
     require_count("every", every)
     require_count("n_steps", n_steps, 1, 1_000_000)
     coarse = gaits.isel({str(name): slice(None, None, every) for name in gaits["status"].dims})
@@ -125,6 +132,13 @@ def _survived(designs: Mapping[str, Vector], states: Vector, n_steps: int) -> Ve
     return np.bincount(who // PUSHES, minlength=len(states)) / PUSHES
 
 
+def _with(column: str, name: str, data: xarray.Dataset) -> xarray.Dataset:
+    """Return a dataset that has a column, or raise ``ValueError``."""
+    if column not in require_instance(name, data, labelled().Dataset):
+        raise ValueError(f"{name} must have {column!r}, got {list(data)}")
+    return data
+
+
 class Atlas:
     """Answers about the designs of a stability map, in memory: two numbers for each design.
 
@@ -134,11 +148,16 @@ class Atlas:
         From ``stability_map``.
     basins : xarray.Dataset, optional
         From ``basin_sizes``; only ``largest_basin`` needs it.
+
+    Raises
+    ------
+    ValueError
+        If one of them is something else.
     """
 
     def __init__(self, gaits: xarray.Dataset, basins: xarray.Dataset | None = None) -> None:
-        self.gaits = require_instance("gaits", gaits, labelled().Dataset)
-        self.basins = basins
+        self.gaits = _with("spectral_radius", "gaits", gaits)
+        self.basins = None if basins is None else _with("basin", "basins", basins)
         self.axes = {str(name): gaits[name].to_numpy() for name in gaits["status"].dims}
         self._speeds = gaits["speed"].to_numpy().astype(np.float32)
         self._speeds[~(gaits["spectral_radius"].to_numpy() < 1.0)] = -np.inf
@@ -173,8 +192,9 @@ class Atlas:
             If no design there is stable.
         """
         axes, box = dict(self.axes), [slice(None)] * len(self.axes)
-        for name, (low, high) in limits.items():
+        for name, pair in limits.items():
             axis, k = self._axis(name)
+            low, high = (require_finite(f"limits of {name}", each) for each in require_pair(name, pair, "least, greatest"))  # fmt: skip
             first, last = np.searchsorted(axis, [low, np.nextafter(high, np.inf)])
             if first >= last:
                 raise ValueError(f"limits of {name} must hold some of {axis.tolist()}, got {low!r} and {high!r}")  # fmt: skip

@@ -177,14 +177,13 @@ def map_cost(
     axes: Mapping[str, Sequence[float] | Vector],
     **command: Unpack[CommandArguments],
 ) -> tuple[float, float]:
-    """Estimate what a ``stability_map`` costs with one thread: bytes of memory without a Zarr store, and seconds from some of its points on this machine."""
+    """Estimate what a ``stability_map`` costs with one thread: bytes of memory without a Zarr store, and seconds from some single points on this machine, more than rows of them take."""
     grid = _Grid(section_map_of(walker, **command), axes)
-    rows = grid.rows
-    rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), 16)).astype(np.intp)]
-    gaits_at(grid.section_map, grid.points(rows[0, :1]), None)  # compiles
+    sample = np.linspace(0, grid.n - 1, min(grid.n, 16)).astype(np.intp)
+    gaits_at(grid.section_map, grid.points(sample[:1]), None)  # compiles
     began = time.process_time()
-    gaits_at(grid.section_map, grid.points(rows.ravel()), None, in_row=rows.shape[1])
-    each = (time.process_time() - began) / rows.size
+    gaits_at(grid.section_map, grid.points(sample), None)
+    each = (time.process_time() - began) / len(sample)
     return grid.n * _bytes(grid), grid.n * each
 
 

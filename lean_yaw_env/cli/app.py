@@ -18,6 +18,7 @@ from lean_yaw_env.cli.commands import Output, add_command, parse_axes, parse_ran
 from lean_yaw_env.engine import Engine
 from lean_yaw_env.parameters import Vector
 from lean_yaw_env.passive import PassiveWalker
+from lean_yaw_env.reporting import NOTHING, keep
 from lean_yaw_env.validation import require_count, require_text
 from lean_yaw_env.walker import Walker
 
@@ -363,6 +364,7 @@ def findings(
     """Compute what this software finds beyond the paper: walking on the level, stability over bodies, what chosen steps can save."""
     from lean_yaw_env.paper.findings import write_findings
 
+    keep(NOTHING)  # before all of it is there
     page = write_findings(out, progress=sys.stderr.isatty())
     return Output({"page": str(page)}, lambda: typer.echo(f"written: {page}"))
 

@@ -21,7 +21,7 @@ from lean_yaw_env.analysis import (
     stability_map,
 )
 from lean_yaw_env.analysis.attraction import require_plane, states_in
-from lean_yaw_env.files import write_text
+from lean_yaw_env.files import require_writable, write_text
 from lean_yaw_env.paper.drawing import FAINT, STABLE_FACE, name_axes, picture_of
 from lean_yaw_env.paper.report import write_columns
 from lean_yaw_env.parameters import Vector, WalkerParameters
@@ -310,7 +310,7 @@ def write_findings(folder: Path, *, size: float = 1.0, progress: bool = False) -
 
     The section about agents takes its numbers from capture.csv in the folder, which ``python -m agents capture`` writes.
     """
-    (folder / "images").mkdir(parents=True, exist_ok=True)
+    require_writable(folder / "images")
     found = compute(size=size, progress=progress)
     rows = numbers(found)
     values, meanings = zip(*rows.values(), strict=True)

@@ -135,7 +135,10 @@ class PageServer:
             places[_AGENTS] = trained
         if policy is not None:
             folder = require_path(policy, "policy").resolve()
-            task = task or _task_of(folder)
+            own = _task_of(folder)
+            if task not in (None, own):
+                raise ValueError(f"the policy in {folder} is for {own}, and task is {task!r}")
+            task = own
             places |= {f"{_OWN}/{name}": folder / name for name in (CARD, WEIGHTS)}
             settings = {"policy": f"{_OWN}/policy"}
             agents = (*agents, _OWN)

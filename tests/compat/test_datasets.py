@@ -84,6 +84,34 @@ def test_the_command_writes_where_it_is_told_and_refuses_bad_values(tmp_path: Pa
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
     assert "leanyaw/waypoint/random-v1" in result.output
-    assert (tmp_path / "leanyaw" / "waypoint" / "random-v1").is_dir()
+    place = tmp_path / "leanyaw" / "waypoint" / "random-v1"
+    written = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
+    assert written and not list(tmp_path.rglob(".partial-*"))
+    again = CliRunner().invoke(app, arguments)  # which goes on where it was, and so does nothing
+    assert again.exit_code == 0, again.output
+    assert {path: path.read_bytes() for path in place.rglob("*") if path.is_file()} == written
+    other = CliRunner().invoke(app, [*arguments, "--seed", "1"])
+    assert other.exit_code == 2 and "holds another dataset" in other.output
     bad = CliRunner().invoke(app, [*arguments[:6], "0"], env={"COLUMNS": "400"})
     assert bad.exit_code == 2 and "episodes must be from 1" in bad.output
+
+
+def test_a_folder_of_something_else_is_refused_and_stays(tmp_path: Path) -> None:
+    place = tmp_path / "leanyaw" / "heading" / "random-v1"
+    place.mkdir(parents=True)
+    (place / "letter.txt").write_text("dear")
+    with pytest.raises(ValueError, match="random-v1"):
+        make_dataset("Heading", "random", tmp_path, episodes=1, progress=False)
+    assert (place / "letter.txt").read_text() == "dear"
+
+
+def test_an_error_leaves_no_part_of_a_dataset(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*arguments: Any) -> None:
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr("agents.datasets._record", fail)
+    with pytest.raises(OSError, match="No space left"):
+        make_dataset("Heading", "random", tmp_path, episodes=1, progress=False)
+    assert not list(tmp_path.iterdir())

@@ -15,8 +15,8 @@ from tests.faults.processes import run_command, start
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="POSIX files")
 
 COMMANDS = {
-    "train": ["train", "--task", "Walk", "--steps", "16384", "--episodes", "2", "--out", "OUT"],
-    "series": ["train", "--task", "Walk", "--steps", "16384", "--episodes", "2", "--seeds", "1", "--out", "OUT"],
+    "train": ["train.py", "--task", "Walk", "--steps", "16384", "--episodes", "2", "--out", "OUT"],
+    "series": ["train.py", "--task", "Walk", "--steps", "16384", "--episodes", "2", "--seeds", "1", "--out", "OUT"],
     "tune": ["agents", "tune", "feedback", "Heading", "--trials", "2", "--episodes", "1", "--storage", "OUT/study.db"],
     "evaluate": ["agents", "evaluate", "--task", "Walk", "--agents", "fixed", "--episodes", "600", "--processes", "1", "--cache", "OUT"],
     "leaderboard": ["agents", "evaluate", "--task", "Walk", "--agents", "fixed", "--episodes", "4", "--processes", "1", "--out", "OUT"],
