@@ -172,7 +172,7 @@ def test_own_bodies_cost_the_step_kernel_few_spilled_registers(as_on_gpu: None) 
     from lean_yaw_env.kernel import cuda
 
     _, spilled = _assembled(_ptx(cuda.step_rows_of_own_bodies, _rows(), (9, 0)), (9, 0))
-    # 192 when written: eight numbers written once and read twice in a step of some 10,000 operations
+    # 192 in an earlier form of the kernel; a step has some 10,000 operations
     assert spilled <= 256
 
 
