@@ -581,7 +581,10 @@ ROWS |= {
     # --- environments
     "EnvOptions": Row(constant(envs.EnvOptions), {}, OPTIONS),
     "EnvOptions.of": Row(
-        constant(envs.EnvOptions.of), {}, {"arguments": (None, 3, "word", {"mirorr": True}, {3: 1})}
+        constant(envs.EnvOptions.of),
+        {},
+        {"arguments": (None, 3, "word", {"mirorr": True}, {3: 1})},
+        ("others",),
     ),
     **{
         f"EnvOptions.{name}": Row(

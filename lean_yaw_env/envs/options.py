@@ -127,7 +127,7 @@ class EnvOptions:
             require_choice("random_body", self.random_body, BODY_DRAWS)
 
     @classmethod
-    def of(cls, arguments: Mapping[str, Any], others: Sequence[str]) -> EnvOptions:
+    def of(cls, arguments: Mapping[str, Any], others: Sequence[str] = ()) -> EnvOptions:
         """Options from an environment's keyword arguments, or ``TypeError`` naming one that there is not, and the nearest that there is.
 
         ``others`` are the environment's arguments that are no options; a misspelt one is among ``arguments``.
