@@ -539,6 +539,11 @@ ROWS |= {
         free=("name", "low", "high"),
     ),
     "LimitCycle.show": Row(lambda: cycle().show, {}, {"n_steps": N_STEPS, "height": count(0)}),
+    "LimitCycle.stance_motion": Row(
+        lambda: cycle().stance_motion,
+        lambda: {"step": cycle().steps[0]},
+        {"step": OBJECT, "samples": SAMPLES},
+    ),
     "Walk.show": Row(lambda: WALKER.walk(1, state=GAIT).show, {}, {"height": count(0)}),
     "Choices": Row(
         constant(analysis.Choices),

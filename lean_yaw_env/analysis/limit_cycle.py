@@ -27,7 +27,7 @@ from lean_yaw_env.analysis.section_map import (
 from lean_yaw_env.errors import LeanYawError, NoGaitError
 from lean_yaw_env.parameters import STATE_SIZE, Vector
 from lean_yaw_env.passive import PassiveWalker
-from lean_yaw_env.validation import require_count
+from lean_yaw_env.validation import require_count, require_instance
 from lean_yaw_env.walker import Walker
 
 if TYPE_CHECKING:
@@ -156,6 +156,7 @@ class LimitCycle:
 
     def stance_motion(self, step: CycleStep, samples: int = 50) -> dict[str, Vector]:
         """The motion and the contact forces within one of the gait's steps; see ``Walker.stance_motion``."""
+        require_instance("step", step, CycleStep)
         return self.section_map.stander.stance_motion(
             step.start[:STATE_SIZE], duration=step.duration, samples=samples, stance=step.foot, **step.command._asdict()
         )  # fmt: skip
