@@ -31,6 +31,7 @@ PAGES = [
 ]
 RUN_ELSEWHERE = {
     "other_libraries": "its programs need other libraries: tests/compat runs them",
+    "gpu": "it needs an accelerator: tests/gpu_simulation.py runs the simulation",
     "enter_your_agent": "it trains for long: test_agents_entries runs it with a short training",
 }
 SHORTER = {

@@ -23,7 +23,6 @@ APPS: dict[str, typer.Typer] = {
 
 SHORT = {
     "python -m agents robustness": "--agents fixed --episodes 1 --processes 1",
-    "python -m agents closed-loop": "--agents fixed --points 5 --starts 16 --directions 4",
     "python -m agents capture": "--agents fixed --starts 8 --points 3",
     "python -m agents film": "--seconds 0.5",
 }
@@ -39,6 +38,7 @@ ELSEWHERE = {
     r"python -m agents evaluate": "test_agents_training.py: --agent-path",
     r"python -m agents dataset": 'compat/test_datasets.py: ["dataset"',
     r"python -m agents (ship|retrain)": "test_agents_series.py: shipped",
+    r"python -m agents closed-loop": 'test_agents_closed_loop.py: ["closed-loop"',
     r"python -m agents reference": "test_agents_references.py: reference",
     r"python -m agents tune linear": "test_agents_linear.py: tune_linear",
     r"python -m agents tune": "test_agents_tuning.py: trials",
