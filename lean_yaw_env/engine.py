@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import platform
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -104,6 +105,8 @@ class Engine:
 
     def _client(self, distributed: Any) -> Any:
         if self.workers is not None:
+            # a worker that Ctrl-C ends is gone before Dask asks how it ended: Dask would warn of this after our last line
+            logging.getLogger("distributed.process").setLevel(logging.ERROR)
             with uninterrupted():  # workers, and those that take their places
                 return distributed.Client(
                     n_workers=self.workers, threads_per_worker=1, memory_limit=0, dashboard_address=":0"

@@ -344,6 +344,7 @@ ROWS = {
             "mass_offsets": OFFSET,
             "previous_offsets": optional(OFFSET),
             "threads": count(0, 2000),
+            "device": NAME,
         },
     ),
 }

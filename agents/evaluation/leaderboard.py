@@ -72,7 +72,7 @@ _ANSWERS = """\
 | what was wrong in version 0 | what version 1 does |
 | --- | --- |
 | Commands were counted in steps, and rewards in time. Slow, long steps met fewer commands. | A command lasts a drawn time. The step across the horizon is paid to the horizon alone. No sweep of constant steps gains by their length; `tests/test_task_laws.py` tests this for each task. |
-| Friction was infinite. | The friction limit of every task is 0.6, and a slip is a fall ([why 0.6](environments.md#friction)). |
+| Friction had no limit. | The friction limit of every task is 0.6, and a slip is a fall ([why 0.6](environments.md#friction)). |
 | Level was solved by a linear law. | Level and LevelUphill are walked under pushes. Without pushes a linear law still came to 0.96 of the reference under the friction limit. |
 | Slalom, Walk and Push were saturated, Heading nearly. | Slalom has stronger pushes. Metastable replaces Push: it measures the time to a fall. Walk ranks no agent. The table of what is left to win shows Heading as it is: the entry level. |
 | The headline was survival of 200 steps, and the interquartile mean hid falls. | The mean, which counts every fall, stands first, and survival beside it. All limits are times. |
