@@ -340,7 +340,9 @@ def test_page_works_from_a_sub_path_of_any_static_host(browser, tmp_path):
 def test_basin_fills_in_and_the_gait_lies_in_it(visit):
     page = visit()
     page.page.get_by_role("button", name="Fill in").click()
-    page.page.wait_for_function("leanYaw.active().basin.count > 1000")
+    page.page.wait_for_function(
+        "leanYaw.active().basin.count > 1000 && [32 * 64 + 32, 31 * 64 + 31].every((k) => leanYaw.active().basin.cells[k] >= 0)"
+    )
     endings = page.look("Array.from(leanYaw.active().basin.cells)")
     middle = [endings[32 * 64 + 32], endings[31 * 64 + 31]]
     assert middle == [0, 0]
