@@ -306,6 +306,13 @@ def _begin_process(done: Any) -> None:
     _done = done
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that half-written files are removed
+    sys.unraisablehook = _report_unraisable
+
+
+def _report_unraisable(unraisable: Any) -> None:
+    """Say nothing of an exit that the signal raised where Python ignores exceptions: the parent ends the process then."""
+    if not issubclass(unraisable.exc_type, SystemExit):
+        sys.__unraisablehook__(unraisable)
 
 
 def _run_in_process(index: int, folder: Path) -> str:
