@@ -5,9 +5,9 @@ Importing the package registers its environments; everything else is loaded when
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from lean_yaw_env.lazy import lazy_names
 from lean_yaw_env.registration import register_envs
 
 if TYPE_CHECKING:
@@ -43,16 +43,7 @@ __all__ = [
     "register_envs",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    for module, names in _EXPORTS.items():
-        if name in names:
-            return getattr(importlib.import_module(f"{__name__}.{module}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted(set(globals()) | set(__all__))
+__getattr__, __dir__ = lazy_names(__name__, _EXPORTS)
 
 
 register_envs()

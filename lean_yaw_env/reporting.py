@@ -10,7 +10,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -100,7 +100,7 @@ def _watched(program: str) -> Iterator[None]:
     reader, writer = socket.socketpair()
     writer.setblocking(False)
     before = {number: signal.signal(number, _interrupt) for number in _SIGNALS}
-    hook, sys.unraisablehook = sys.unraisablehook, _report_unraisable
+    hook, sys.unraisablehook = sys.unraisablehook, unraisable_hook(KeyboardInterrupt)
     wakeup = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
     threading.Thread(target=_end_after_signal, args=(reader, program), daemon=True).start()
     try:
@@ -114,10 +114,15 @@ def _watched(program: str) -> Iterator[None]:
                 signal.signal(number, handler)
 
 
-def _report_unraisable(unraisable: Any) -> None:
-    """Report an error in a callback of a C library, but for an interruption: the process is ended soon."""
-    if not issubclass(unraisable.exc_type, KeyboardInterrupt):
-        sys.__unraisablehook__(unraisable)
+def unraisable_hook(silent: type[BaseException]) -> Callable[[Any], None]:
+    """A ``sys.unraisablehook`` that reports errors where Python cannot raise them, as in a callback of a C library, but for the one that a signal raised:
+    the process is ended soon."""
+
+    def report(unraisable: Any) -> None:
+        if not issubclass(unraisable.exc_type, silent):
+            sys.__unraisablehook__(unraisable)
+
+    return report
 
 
 def _interrupt(number: int, frame: FrameType | None) -> NoReturn:

@@ -1004,7 +1004,7 @@ BEHIND = (
     # what the modules above are made of
     "agents.agent", "agents.controllers", "agents.observations", "agents.policies", "agents.registry", "agents.seeds", "agents.settings",
     "lean_yaw_env.errors", "lean_yaw_env.extras", "lean_yaw_env.files", "lean_yaw_env.kernel", "lean_yaw_env.parameters",
-    "lean_yaw_env.reporting", "lean_yaw_env.tables", "lean_yaw_env.threads", "lean_yaw_env.validation", "lean_yaw_env.walker",
+    "lean_yaw_env.lazy", "lean_yaw_env.reporting", "lean_yaw_env.tables", "lean_yaw_env.threads", "lean_yaw_env.validation", "lean_yaw_env.walker",
 )  # fmt: skip
 """Modules and packages that users reach through a command, or through a module of the list above."""
 

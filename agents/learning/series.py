@@ -22,7 +22,7 @@ from tqdm import tqdm
 from lean_yaw_env.errors import LeanYawError
 from lean_yaw_env.files import locked, read_json, write_json, write_text
 from lean_yaw_env.registration import ALL_ENV_IDS
-from lean_yaw_env.reporting import uninterrupted
+from lean_yaw_env.reporting import uninterrupted, unraisable_hook
 from lean_yaw_env.tables import csv_table
 from lean_yaw_env.validation import require_choice, require_count
 
@@ -306,13 +306,7 @@ def _begin_process(done: Any) -> None:
     _done = done
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that half-written files are removed
-    sys.unraisablehook = _report_unraisable
-
-
-def _report_unraisable(unraisable: Any) -> None:
-    """Say nothing of an exit that the signal raised where Python ignores exceptions: the parent ends the process then."""
-    if not issubclass(unraisable.exc_type, SystemExit):
-        sys.__unraisablehook__(unraisable)
+    sys.unraisablehook = unraisable_hook(SystemExit)
 
 
 def _run_in_process(index: int, folder: Path) -> str:

@@ -18,7 +18,7 @@ from typing import BinaryIO
 from urllib.parse import urlencode, urlsplit
 
 from lean_yaw_env.files import json_text, read_json, require_path, write_json
-from lean_yaw_env.registration import NAMESPACE, TASK_VERSIONS
+from lean_yaw_env.registration import ENV_IDS, TASK_VERSIONS
 from lean_yaw_env.validation import require_choice
 from lean_yaw_env.viewer.shipped import CARD, WEIGHTS, agent_index, trained_folder
 
@@ -185,7 +185,7 @@ def _task_of(folder: Path) -> str:
             )
     card = read_json(folder / CARD)
     env_id = str(card.get("env_id") if isinstance(card, dict) else None)
-    ids = {f"{NAMESPACE}/{task}-v{version}": task for task, version in TASK_VERSIONS.items()}
+    ids = dict(zip(ENV_IDS, TASK_VERSIONS, strict=True))
     if env_id not in ids:
         raise ValueError(
             f"the policy in {folder} is for {env_id}, and the page has {', '.join(ids)}"
